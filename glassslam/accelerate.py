@@ -1,0 +1,38 @@
+"""The project's way of compiling kernels: no bounds checks, no GIL, cached on disk."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _choose_cache_folder() -> None:
+    """Point numba at a folder it can write: it raises at import time otherwise."""
+    if "NUMBA_CACHE_DIR" in os.environ and _writable(Path(os.environ["NUMBA_CACHE_DIR"])):
+        return
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser() / ".cache") / "glassslam" / "numba"
+    folder = user if _writable(user) else Path(tempfile.gettempdir()) / f"glassslam-numba-{os.getuid()}"
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+
+
+_choose_cache_folder()
+
+import numba  # noqa: E402  (the cache folder must be known before numba reads its configuration)
+
+
+def kernel(function: _F) -> _F:
+    """Compile `function` in nopython mode with numpy error semantics, without the GIL, cached."""
+    compiled: _F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return compiled

@@ -1,0 +1,46 @@
+"""Every error a user can meet: one line of cause, one line of hint."""
+
+
+class GlassSlamError(Exception):
+    """Base of all errors raised on purpose.
+
+    Parameters
+    ----------
+    message : str
+        The cause, one line.
+    hint : str
+        What to do about it, one line; may be empty.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+
+class UsageError(GlassSlamError):
+    """A wrong or missing option, or an ambiguous request."""
+
+    exit_code = 2
+
+
+class ConfigError(UsageError):
+    """An unknown, ill-typed or non-finite configuration value."""
+
+
+class RecordingError(GlassSlamError):
+    """A recording that cannot be read at all."""
+
+
+class NoScansError(RecordingError):
+    """A recording in which no usable laser scan was found."""
+
+
+class OutputError(GlassSlamError):
+    """A result that cannot be written or read back."""
+
+
+class EvaluationError(GlassSlamError):
+    """A truth file that does not fit the result."""

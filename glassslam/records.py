@@ -1,0 +1,146 @@
+"""Plain sensor records: what flows from a recording into the mapper."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+Float32Array: TypeAlias = NDArray[np.float32]
+
+
+def _empty() -> Float32Array:
+    return np.empty(0, dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """One sweep of a planar lidar, as recorded.
+
+    Attributes
+    ----------
+    stamp : float
+        Time of the first beam, s.
+    ranges : ndarray of float32, shape (n,)
+        Metres; +inf or at least `range_max`: no echo; NaN, -inf, 0 or below `range_min`: invalid.
+    angle_min, angle_increment : float
+        Angle of the first beam and step between beams in the laser frame, rad.
+    range_min, range_max : float
+        Limits of the sensor, m.
+    time_increment : float
+        Time between two beams, s; 0 when unknown.
+    intensities : ndarray of float32, shape (n,) or (0,)
+        Echo strength in the unit of the sensor; empty when not recorded.
+    frame_id : str
+        Name of the laser frame.
+    record_stamp : float
+        Time at which the message was recorded, s.
+    """
+
+    stamp: float
+    ranges: Float32Array
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    time_increment: float = 0.0
+    intensities: Float32Array = field(default_factory=_empty)
+    frame_id: str = "laser"
+    record_stamp: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Pose of the robot base in the drifting odometry frame.
+
+    Attributes
+    ----------
+    stamp : float
+        Time, s.
+    pose : tuple of float
+        (x, y, theta) of the base in the odometry frame, m and rad.
+    record_stamp : float
+        Time at which the message was recorded, s.
+    """
+
+    stamp: float
+    pose: tuple[float, float, float]
+    record_stamp: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """Yaw rate of the robot base.
+
+    Attributes
+    ----------
+    stamp : float
+        Time, s.
+    yaw_rate : float
+        Angular velocity about the vertical axis of the base, rad/s, counter-clockwise positive.
+    record_stamp : float
+        Time at which the message was recorded, s.
+    """
+
+    stamp: float
+    yaw_rate: float
+    record_stamp: float = 0.0
+
+
+Record: TypeAlias = LaserScan | Odometry | Imu
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingInfo:
+    """What a source knows of the recording it streams.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        The files read, as given.
+    format : str
+        "rosbag1", "rosbag2-sqlite3", "rosbag2-mcap" or "carmen".
+    duration : float
+        Recorded time from the first to the last record used, s.
+    scan_count : int
+        Number of scan messages announced by the index (0 when unknown).
+    base_from_laser : tuple of float
+        Pose (x, y, yaw) of the laser in the base frame, m and rad.
+    scan_topic, odom_topic, imu_topic : str
+        Topics in use; empty when there is none. Odometry from tf is named "tf:PARENT->CHILD".
+    """
+
+    paths: tuple[str, ...]
+    format: str
+    duration: float
+    scan_count: int
+    base_from_laser: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    scan_topic: str = ""
+    odom_topic: str = ""
+    imu_topic: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Stamped planar poses, in the order of the recording.
+
+    Attributes
+    ----------
+    stamps : ndarray of float64, shape (n,)
+        Times, s; not necessarily increasing.
+    poses : ndarray of float64, shape (n, 3)
+        (x, y, theta) in the map frame, m and rad.
+    """
+
+    stamps: FloatArray
+    poses: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.stamps.ndim != 1 or self.poses.shape != (self.stamps.size, 3):
+            raise ValueError(f"poses of shape {self.poses.shape} do not fit {self.stamps.shape} stamps")
+
+
+RecordStream: TypeAlias = Iterable[Record]
+Counts: TypeAlias = Mapping[str, int]

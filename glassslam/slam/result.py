@@ -1,0 +1,111 @@
+"""What a finished run hands to the outputs."""
+
+from dataclasses import dataclass, field
+
+from glassslam.config import Config
+from glassslam.posegraph.graph import Constraint
+from glassslam.records import Float32Array, FloatArray, RecordingInfo, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class OccupancyMap:
+    """A finished map.
+
+    Attributes
+    ----------
+    probability : ndarray of float32, shape (rows, columns)
+        P(occupied); NaN where never observed. Row 0 is the lowest y, column 0 the lowest x.
+    resolution : float
+        Cell edge, m.
+    origin : tuple of float
+        Lower left corner of cell (0, 0) in the map frame, m.
+    """
+
+    probability: Float32Array
+    resolution: float
+    origin: tuple[float, float]
+
+
+@dataclass(slots=True)
+class StageTime:
+    """Seconds spent in one stage, summed over all threads."""
+
+    wall: float = 0.0
+    cpu: float = 0.0
+
+
+@dataclass(slots=True)
+class RunStatistics:
+    """Counts and times of a run, as they go into report.json.
+
+    Attributes
+    ----------
+    scans_read, scans_used : int
+        Scans delivered by the source; scans that have a pose in the trajectory.
+    scans_dropped : dict
+        Reason -> number of scans without a pose.
+    recording_seconds : float
+        Recorded time between the first and the last scan, s.
+    stages : dict
+        Stage name -> `StageTime`.
+    nodes, submaps : int
+        Size of the pose graph.
+    closures_tried, closures_accepted : int
+        Loop-closure searches made, constraints in the final graph.
+    closures_rejected : dict
+        Reason -> number of found matches that were thrown away.
+    residuals : dict
+        Name -> value (for example "loop_translation_rms" in m).
+    warnings : list of str
+        What a user should know, one line each.
+    """
+
+    scans_read: int = 0
+    scans_used: int = 0
+    scans_dropped: dict[str, int] = field(default_factory=dict)
+    recording_seconds: float = 0.0
+    stages: dict[str, StageTime] = field(default_factory=dict)
+    nodes: int = 0
+    submaps: int = 0
+    closures_tried: int = 0
+    closures_accepted: int = 0
+    closures_rejected: dict[str, int] = field(default_factory=dict)
+    residuals: dict[str, float] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class MapResult:
+    """Everything a run found out.
+
+    Attributes
+    ----------
+    map : OccupancyMap
+        The rendered map.
+    trajectory : Trajectory
+        Pose of the robot base at every used scan, in the map frame, in the order of the recording.
+    node_stamps : ndarray of float64, shape (n,)
+        Times of the nodes, s.
+    node_poses : ndarray of float64, shape (n, 3)
+        Optimised poses of the base at the nodes, map frame.
+    submap_poses : ndarray of float64, shape (m, 3)
+        Optimised poses of the submap frames, map frame.
+    constraints : tuple of Constraint
+        Edges of the pose graph; submap k is vertex k, node i is vertex `len(submap_poses) + i`.
+    config : Config
+        The resolved configuration.
+    statistics : RunStatistics
+        Counts and times.
+    info : RecordingInfo or None
+        The source, when the run had one.
+    """
+
+    map: OccupancyMap
+    trajectory: Trajectory
+    node_stamps: FloatArray
+    node_poses: FloatArray
+    submap_poses: FloatArray
+    constraints: tuple[Constraint, ...]
+    config: Config
+    statistics: RunStatistics
+    info: RecordingInfo | None = None
