@@ -1,10 +1,11 @@
 """The project's way of compiling kernels: no bounds checks, no GIL, cached on disk."""
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -18,12 +19,19 @@ def _writable(folder: Path) -> bool:
         return False
 
 
+def _fingerprint() -> str:
+    """Digest of the generated kernels: numba would not notice that one its cached callers inlined changed."""
+    generated = sorted(Path(__file__).parent.glob("*/_generated.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in generated)).hexdigest()[:12]
+
+
 def _choose_cache_folder() -> None:
     """Point numba at a folder it can write: it raises at import time otherwise."""
     if "NUMBA_CACHE_DIR" in os.environ and _writable(Path(os.environ["NUMBA_CACHE_DIR"])):
         return
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser() / ".cache") / "glassslam" / "numba"
-    folder = user if _writable(user) else Path(tempfile.gettempdir()) / f"glassslam-numba-{os.getuid()}"
+    base = user if _writable(user) else Path(tempfile.gettempdir()) / f"glassslam-numba-{os.getuid()}"
+    folder = base / _fingerprint()
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
 
 
@@ -34,5 +42,4 @@ import numba  # noqa: E402  (the cache folder must be known before numba reads i
 
 def kernel(function: _F) -> _F:
     """Compile `function` in nopython mode with numpy error semantics, without the GIL, cached."""
-    compiled: _F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    return cast(_F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))

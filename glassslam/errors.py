@@ -44,3 +44,7 @@ class OutputError(GlassSlamError):
 
 class EvaluationError(GlassSlamError):
     """A truth file that does not fit the result."""
+
+
+class GraphError(GlassSlamError):
+    """A pose graph that cannot be built or solved."""

@@ -110,6 +110,8 @@ class RecordingInfo:
         Pose (x, y, yaw) of the laser in the base frame, m and rad.
     scan_topic, odom_topic, imu_topic : str
         Topics in use; empty when there is none. Odometry from tf is named "tf:PARENT->CHILD".
+    no_echo : float or None
+        The range written for beams without echo, m (may be inf); None when it is not known.
     """
 
     paths: tuple[str, ...]
@@ -120,6 +122,7 @@ class RecordingInfo:
     scan_topic: str = ""
     odom_topic: str = ""
     imu_topic: str = ""
+    no_echo: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

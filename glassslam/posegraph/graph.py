@@ -6,6 +6,8 @@ from typing import Literal, TypeAlias
 from glassslam.records import FloatArray
 
 ConstraintKind: TypeAlias = Literal["intra", "loop", "odometry"]
+Loss: TypeAlias = Literal["none", "huber", "geman_mcclure"]
+Solver: TypeAlias = Literal["lm", "casadi"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,3 +31,26 @@ class Constraint:
     a_from_b: FloatArray
     sqrt_information: FloatArray
     kind: ConstraintKind
+
+
+@dataclass(frozen=True, slots=True)
+class OptimizationReport:
+    """What an optimisation did.
+
+    Attributes
+    ----------
+    iterations : int
+        Linear systems solved.
+    initial_cost, final_cost : float
+        Half the sum of the losses before and after.
+    converged : bool
+        Whether it ended at a minimum rather than at the limit of iterations.
+    residual_norms : ndarray of float64, shape (constraints,)
+        Norm of every weighted residual after, without loss, disabled constraints included.
+    """
+
+    iterations: int
+    initial_cost: float
+    final_cost: float
+    converged: bool
+    residual_norms: FloatArray

@@ -44,6 +44,8 @@ class RunStatistics:
         Scans delivered by the source; scans that have a pose in the trajectory.
     scans_dropped : dict
         Reason -> number of scans without a pose.
+    messages_dropped : dict
+        Reason -> number of messages of the recording that could not become records.
     recording_seconds : float
         Recorded time between the first and the last scan, s.
     stages : dict
@@ -63,6 +65,7 @@ class RunStatistics:
     scans_read: int = 0
     scans_used: int = 0
     scans_dropped: dict[str, int] = field(default_factory=dict)
+    messages_dropped: dict[str, int] = field(default_factory=dict)
     recording_seconds: float = 0.0
     stages: dict[str, StageTime] = field(default_factory=dict)
     nodes: int = 0

@@ -1,0 +1,130 @@
+"""A recording mapped in one call."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from glassslam.config import Config
+from glassslam.records import LaserScan, RecordingInfo
+from glassslam.sources import SourceOptions, open_recording
+
+if TYPE_CHECKING:
+    from glassslam.slam.mapper import Mapper
+    from glassslam.slam.result import MapResult
+    from glassslam.sources import Recording
+
+_SECONDS_BETWEEN_REPORTS = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run has come.
+
+    Attributes
+    ----------
+    stage : {"mapping", "finishing", "done"}
+        Reading and matching scans; the last loop closures, optimisation and drawing; nothing more.
+    scans : int
+        Scans read so far.
+    recorded_seconds : float
+        Recorded time passed so far, s.
+    info : RecordingInfo
+        The source; its duration and scan count tell how much there is.
+    """
+
+    stage: Literal["mapping", "finishing", "done"]
+    scans: int
+    recorded_seconds: float
+    info: RecordingInfo
+
+
+ProgressCallback: TypeAlias = Callable[[Progress], None]
+
+
+def map_recording(
+    recording: str | Path | Sequence[str | Path],
+    config: Config | None = None,
+    *,
+    source_options: SourceOptions | None = None,
+    progress: ProgressCallback | None = None,
+) -> "MapResult":
+    """Map a recording from its first to its last scan.
+
+    Parameters
+    ----------
+    recording : path or sequence of paths
+        A bag, mcap or CARMEN log, or several that follow each other.
+    config : Config, optional
+        Parameters; the defaults when left out.
+    source_options : SourceOptions, optional
+        Topics, extrinsics and the part of the recording to use.
+    progress : callable, optional
+        Called with a `Progress` about ten times a second, in the calling thread.
+
+    Returns
+    -------
+    MapResult
+        Map, trajectory, pose graph and statistics; what the source dropped is counted in
+        `statistics.messages_dropped`, what it warned of stands in `statistics.warnings`.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read, or holds no usable scan (`NoScansError`).
+    UsageError
+        The options do not fit the recording.
+
+    Examples
+    --------
+    >>> import glassslam as gs
+    >>> result = gs.map_recording("run.bag")  # doctest: +SKIP
+    >>> result.trajectory.poses[-1]  # doctest: +SKIP
+    array([12.31,  4.02,  1.57])
+    >>> gs.write_results(result, "run-map")  # doctest: +SKIP
+    """
+    paths = [recording] if isinstance(recording, str | Path) else list(recording)
+    source = open_recording(paths, source_options or SourceOptions())
+    # The kernels are loaded only now: a recording that cannot be read is told at once.
+    from glassslam.slam.mapper import Mapper  # noqa: PLC0415
+
+    mapper = Mapper(config or Config(), source.info.base_from_laser)
+    reporter = _Reporter(progress, source.info)
+    _feed(mapper, source, reporter)
+    reporter.tell("finishing")
+    result = mapper.finish(source.info)
+    reporter.tell("done")
+    result.statistics.messages_dropped.update(source.dropped)
+    result.statistics.warnings[:0] = source.warnings
+    return result
+
+
+class _Reporter:
+    """Counts scans and calls the callback now and then."""
+
+    def __init__(self, callback: ProgressCallback | None, info: RecordingInfo) -> None:
+        self._callback, self._info = callback, info
+        self._first, self._last, self._due = 0.0, 0.0, 0.0
+        self.scans = 0
+
+    def count(self, scan: LaserScan) -> None:
+        # Stamps may step back; recorded time does not.
+        self._first, self._last = (
+            (self._first, max(self._last, scan.stamp)) if self.scans else (scan.stamp, scan.stamp)
+        )
+        self.scans += 1
+        if time.monotonic() >= self._due:
+            self.tell("mapping")
+            self._due = time.monotonic() + _SECONDS_BETWEEN_REPORTS
+
+    def tell(self, stage: Literal["mapping", "finishing", "done"]) -> None:
+        if self._callback is not None:
+            self._callback(Progress(stage, self.scans, self._last - self._first, self._info))
+
+
+def _feed(mapper: "Mapper", source: "Recording", reporter: _Reporter) -> None:
+    for record in source.records():
+        mapper.add(record)
+        if isinstance(record, LaserScan):
+            reporter.count(record)

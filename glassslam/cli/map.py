@@ -1,0 +1,139 @@
+"""`glassslam map`: make a map from a recording."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+EXAMPLES = """\
+  glassslam map run.bag                             results in run-map/
+  glassslam map run.bag -o office --overwrite       replace earlier results
+  glassslam map part1.bag part2.bag -o office       recordings that follow each other
+  glassslam map run.mcap --scan-topic /front/scan   choose among several lidars
+  glassslam map run.bag --laser-pose 0.1,0,0        the laser sits 0.1 m ahead of the centre
+  glassslam map run.clf.gz --config sick.yaml --set sensor.max_range=20
+  glassslam map run.bag --start 10 --duration 60 --every 2
+"""
+
+Recordings = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RECORDING...",
+        help="ROS 1 bag, ROS 2 bag (file or directory), mcap or CARMEN log; several follow each other.",
+        show_default=False,
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="DIR", help="Results directory [default: NAME-map]."),
+]
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option("--config", metavar="FILE", help="YAML file of parameters; see glassslam config."),
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="SECTION.NAME=VALUE", help="Change one parameter; may be repeated."),
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in DIR.")]
+ScanTopic = Annotated[str | None, typer.Option(help="Topic of the laser scans.", metavar="TOPIC")]
+OdomTopic = Annotated[str | None, typer.Option(help="Topic of the odometry; tf, or none.", metavar="TOPIC")]
+ImuTopic = Annotated[str | None, typer.Option(help="Topic of the IMU, or none.", metavar="TOPIC")]
+LaserPose = Annotated[
+    str | None, typer.Option(metavar="X,Y,YAW", help="Pose of the laser on the robot, m and rad.")
+]
+Start = Annotated[float, typer.Option(metavar="SECONDS", help="Leave out the first seconds.")]
+Duration = Annotated[
+    float | None, typer.Option(metavar="SECONDS", help="Use so many seconds [default: all].")
+]
+Every = Annotated[int, typer.Option(metavar="N", help="Use every N-th scan.")]
+Echo = Annotated[
+    str, typer.Option(metavar="WHICH", help="Echo of multi-echo scans: first, last or strongest.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the report as JSON instead of the summary.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+def map_command(
+    recordings: Recordings,
+    output: Output = None,
+    config: ConfigFile = None,
+    assignments: Assignments = None,
+    overwrite: Overwrite = False,
+    scan_topic: ScanTopic = None,
+    odom_topic: OdomTopic = None,
+    imu_topic: ImuTopic = None,
+    laser_pose: LaserPose = None,
+    start: Start = 0.0,
+    duration: Duration = None,
+    every: Every = 1,
+    echo: Echo = "first",
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make a map from a recording and write it, the trajectory, the pose graph and a report to DIR.
+
+    Topics are picked where there is only one choice. DIR appears when everything is done:
+    a failed or interrupted run leaves nothing behind and earlier results as they were.
+    """
+    from glassslam.outputs import Stopwatch, check_directory  # noqa: PLC0415  (loads numpy)
+
+    stopwatch = Stopwatch()
+    from glassslam.cli.settings import default_directory, parse_pose, resolve_config  # noqa: PLC0415
+
+    directory = output or default_directory(recordings)
+    check_directory(directory, overwrite=overwrite)
+    pose, resolved = parse_pose(laser_pose), resolve_config(config, assignments or ())
+    from glassslam.sources import SourceOptions  # noqa: PLC0415  (loads rosbags)
+
+    options = SourceOptions(
+        scan_topic=scan_topic,
+        odom_topic=odom_topic,
+        imu_topic=imu_topic,
+        laser_pose=pose,
+        start=start,
+        duration=duration,
+        every=every,
+        echo=echo,  # type: ignore[arg-type]  # other words are refused by SourceOptions
+    )
+    return _run(recordings, directory, resolved, options, stopwatch, overwrite, json, quiet)
+
+
+def _run(
+    recordings: list[Path],
+    directory: Path,
+    config: Any,
+    options: Any,
+    stopwatch: Any,
+    overwrite: bool,
+    json: bool,
+    quiet: bool,
+) -> int:
+    from glassslam.api import map_recording  # noqa: PLC0415  (loads numba and casadi)
+    from glassslam.cli.progress import progress_bar  # noqa: PLC0415
+    from glassslam.outputs import build_report, write_results  # noqa: PLC0415
+
+    with progress_bar(quiet=quiet) as progress:
+        result = map_recording(recordings, config, source_options=options, progress=progress)
+    written = write_results(result, directory, overwrite=overwrite, stopwatch=stopwatch)
+    report = build_report(result, stopwatch.read())
+    if json:
+        _print_json(report, directory)
+    elif not quiet:
+        from glassslam.cli.summary import show_summary  # noqa: PLC0415  (loads rich)
+
+        show_summary(report, written)
+    return 3 if is_damaged(report) else 0
+
+
+def _print_json(report: dict[str, Any], directory: Path) -> None:
+    import json  # noqa: PLC0415  (only for --json)
+
+    from glassslam.cli.terminal import emit  # noqa: PLC0415
+
+    emit(json.dumps({"directory": str(directory), **report}, indent=2, allow_nan=False) + "\n")
+
+
+def is_damaged(report: dict[str, Any]) -> bool:
+    """Whether anything was dropped that the user did not ask to leave out."""
+    return any((*report["scans"]["dropped"].values(), *report["messages_dropped"].values()))

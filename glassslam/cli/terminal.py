@@ -1,0 +1,70 @@
+"""Writing to the terminal: results to standard output, complaints as one line to standard error."""
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from glassslam.errors import OutputError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+def emit(text: str) -> None:
+    """Write a result to standard output; a reader that has gone away is no error.
+
+    Raises
+    ------
+    OutputError
+        Standard output cannot be written for another reason.
+    """
+    # Started with a closed descriptor, Python has no stream at all.
+    if sys.stdout is None:
+        return
+    try:
+        sys.stdout.write(_writable(text, sys.stdout.encoding))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        discard_output()
+    except OSError as error:
+        discard_output()
+        raise OutputError(f"cannot write to standard output: {error.strerror}") from error
+
+
+def emit_rich(*parts: "RenderableType") -> None:
+    """Render tables and the like for the width and the colours of standard output, and write them."""
+    from rich.console import Console  # noqa: PLC0415  (40 ms)
+
+    if sys.stdout is None:
+        return
+    console = Console(markup=False, highlight=False, emoji=False)
+    with console.capture() as capture:
+        for part in parts:
+            console.print(part)
+    emit(capture.get())
+
+
+def complain(message: str, hint: str = "", *, code: int) -> int:
+    """Write one line with cause and hint to standard error, and hand the exit code on."""
+    line = f"error: {message} ({hint})" if hint else f"error: {message}"
+    if sys.stderr is not None:
+        try:
+            sys.stderr.write(_writable(" ".join(line.split()), sys.stderr.encoding) + "\n")
+            sys.stderr.flush()
+        except OSError:
+            pass
+    return code
+
+
+def discard_output() -> None:
+    """Send what is still to be written nowhere: flushing at the end of the process must not fail."""
+    sink = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, sys.stdout.fileno())
+    finally:
+        os.close(sink)
+
+
+def _writable(text: str, encoding: str | None) -> str:
+    """Replace what the stream cannot encode: file names may hold any byte."""
+    return text.encode(encoding or "utf-8", "backslashreplace").decode(encoding or "utf-8")

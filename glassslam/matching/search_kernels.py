@@ -1,0 +1,181 @@
+"""Kernels of the correlative searches: max grids, discretised scans, branch and bound (Hess et al. 2016, section V)."""
+
+import math
+
+import numpy as np
+
+from glassslam.accelerate import kernel
+
+
+@kernel
+def max_over_windows(source, shift, out):  # type: ignore[no-untyped-def]
+    """out[y, x] = max of source over the window (y .. y + shift, x .. x + shift) of corners `shift` apart.
+
+    Doubling the window of a grid that already holds maxima over windows of edge `shift`.
+    """
+    rows, columns = source.shape
+    for y in range(rows):
+        y2 = min(y + shift, rows - 1)
+        for x in range(columns):
+            x2 = min(x + shift, columns - 1)
+            out[y, x] = max(max(source[y, x], source[y, x2]), max(source[y2, x], source[y2, x2]))
+
+
+@kernel
+def quantise(cells, scores, factor, pad, out):  # type: ignore[no-untyped-def]
+    """Scores of a cell grid as bytes, the maximum of each factor x factor block, `pad` zeros around."""
+    rows, columns = cells.shape
+    for y in range(rows):
+        for x in range(columns):
+            value = cells[y, x]
+            if value:
+                byte = np.uint8(scores[value] * 255.0 + 0.5)
+                r, c = y // factor + pad, x // factor + pad
+                if byte > out[r, c]:
+                    out[r, c] = byte
+
+
+@kernel
+def discretise(  # type: ignore[no-untyped-def]
+    points, x, y, first_angle, angle_step, count, inverse_cell, rows, columns, pad, reach, index, lengths
+):
+    """Flat indices into a padded grid of the scan turned by each candidate angle.
+
+    Points that no offset of the search brings into the grid are left out. `lengths[a]` is the
+    number of points kept in row a of `index`; (x, y) is the scan position from the grid's corner, m.
+    """
+    stride = columns + 2 * pad
+    for a in range(count):
+        angle = first_angle + a * angle_step
+        cosine, sine = math.cos(angle), math.sin(angle)
+        n = 0
+        for k in range(points.shape[0]):
+            px, py = points[k, 0], points[k, 1]
+            c = int(math.floor((cosine * px - sine * py + x) * inverse_cell))
+            r = int(math.floor((sine * px + cosine * py + y) * inverse_cell))
+            if -reach <= c < columns + reach and -reach <= r < rows + reach:
+                index[a, n] = (r + pad) * stride + c + pad
+                n += 1
+        lengths[a] = n
+
+
+@kernel
+def _score(level, index, a, n, offset):  # type: ignore[no-untyped-def]
+    total = np.int64(0)
+    for k in range(n):
+        total += level[index[a, k] + offset]
+    return total
+
+
+@kernel
+def _coarse_scores(level, stride, index, lengths, window, step, scores):  # type: ignore[no-untyped-def]
+    """Upper bounds of all coarse candidates, shape (angles, offsets_y, offsets_x)."""
+    for a in range(index.shape[0]):
+        for iy in range(scores.shape[1]):
+            for ix in range(scores.shape[2]):
+                offset = (iy * step - window) * stride + ix * step - window
+                scores[a, iy, ix] = _score(level, index, a, lengths[a], offset)
+
+
+@kernel
+def _descend(levels, stride, index, lengths, window, start_level, a, dx, dy, best, found, stack):  # type: ignore[no-untyped-def]
+    """Depth-first search below one coarse candidate; the best leaf goes into `found`, its score is returned."""
+    top = 0
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = start_level, dx, dy, best + 1
+    child = np.empty((4, 3), dtype=np.int64)
+    while top >= 0:
+        level, x, y, bound = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+        top -= 1
+        if bound <= best:
+            continue
+        if level == 0:
+            best = bound
+            found[0], found[1], found[2] = a, x, y
+            continue
+        half = 1 << (level - 1)
+        count = 0
+        for cy in range(2):
+            for cx in range(2):
+                nx, ny = x + cx * half, y + cy * half
+                if nx > window or ny > window:
+                    continue
+                score = _score(levels[level - 1], index, a, lengths[a], ny * stride + nx)
+                if score <= best:
+                    continue
+                at = count
+                while at > 0 and child[at - 1, 0] > score:  # best child last: it is popped first
+                    child[at] = child[at - 1]
+                    at -= 1
+                child[at, 0], child[at, 1], child[at, 2] = score, nx, ny
+                count += 1
+        for c in range(count):
+            top += 1
+            stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = (
+                level - 1, child[c, 1], child[c, 2], child[c, 0],
+            )  # fmt: skip
+    return best
+
+
+@kernel
+def branch_and_bound(levels, stride, index, lengths, window, start_level, threshold, found):  # type: ignore[no-untyped-def]
+    """Best (angle, dx, dy) with a score sum above `threshold`; returns the score, or `threshold` when none.
+
+    `levels` has shape (depth, cells of the padded grid): level h holds maxima over windows of edge 2^h.
+    """
+    step = 1 << start_level
+    offsets = (2 * window) // step + 1
+    scores = np.empty((index.shape[0], offsets, offsets), dtype=np.int32)
+    _coarse_scores(levels[start_level], stride, index, lengths, window, step, scores)
+    flat = scores.ravel()
+    order = np.argsort(-flat, kind="mergesort")
+    stack = np.empty((4 * (start_level + 2), 4), dtype=np.int64)
+    best = threshold
+    for k in order:
+        if flat[k] <= best:
+            break
+        a = k // (offsets * offsets)
+        dy = (k // offsets) % offsets * step - window
+        dx = k % offsets * step - window
+        best = _descend(levels, stride, index, lengths, window, start_level, a, dx, dy, best, found, stack)
+    return best
+
+
+@kernel
+def exhaustive_search(  # type: ignore[no-untyped-def]
+    cells, table, origin, inverse_resolution, points, guess, steps, angle_steps, angle_step, translation_cost,
+    rotation_cost, pose
+):  # fmt: skip
+    """Best pose on the raster of cells and angles around a guess; returns its penalised score.
+
+    Score: mean P(occupied) of the cells hit, times exp(-(translation_cost |t| + rotation_cost |theta|)^2)
+    as in Cartographer's real-time correlative matcher. `steps` is the half window in cells.
+    """
+    rows, columns = cells.shape
+    best = -1.0
+    count = points.shape[0]
+    for a in range(-angle_steps, angle_steps + 1):
+        cosine, sine = math.cos(guess[2] + a * angle_step), math.sin(guess[2] + a * angle_step)
+        side = 2 * steps + 1
+        sums = np.zeros((side, side), dtype=np.float32)
+        for k in range(count):
+            px, py = points[k, 0], points[k, 1]
+            c = int(math.floor((cosine * px - sine * py + guess[0] - origin[0]) * inverse_resolution)) - steps
+            r = int(math.floor((sine * px + cosine * py + guess[1] - origin[1]) * inverse_resolution)) - steps
+            if c < 0 or r < 0 or c + side > columns or r + side > rows:
+                continue
+            for dy in range(side):
+                for dx in range(side):
+                    value = cells[r + dy, c + dx]
+                    if value:
+                        sums[dy, dx] += table[value]
+        for dy in range(side):
+            for dx in range(side):
+                shift = math.hypot(dx - steps, dy - steps) / inverse_resolution
+                cost = translation_cost * shift + rotation_cost * abs(a * angle_step)
+                score = sums[dy, dx] / count * math.exp(-cost * cost)
+                if score > best:
+                    best = score
+                    pose[0] = guess[0] + (dx - steps) / inverse_resolution
+                    pose[1] = guess[1] + (dy - steps) / inverse_resolution
+                    pose[2] = guess[2] + a * angle_step
+    return best

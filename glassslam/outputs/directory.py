@@ -1,0 +1,153 @@
+"""A results directory that appears whole or not at all."""
+
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from glassslam.errors import OutputError, UsageError
+
+RESULT_FILES = (
+    "map.yaml",
+    "map.pgm",
+    "map.png",
+    "trajectory.tum",
+    "graph.g2o",
+    "config.yaml",
+    "report.json",
+)
+
+_HINTS = {
+    errno.ENOSPC: "free some space or choose another disk",
+    errno.EDQUOT: "the quota of this disk is used up",
+    errno.EACCES: "choose a directory you may write",
+    errno.EPERM: "choose a directory you may write",
+    errno.EROFS: "choose a directory on a writable disk",
+    errno.ENOTDIR: "a part of the path is a file",
+}
+
+
+def check_directory(directory: str | Path, *, overwrite: bool = False) -> Path:
+    """Make sure, before any work is done, that results may be written to a directory.
+
+    Parameters
+    ----------
+    directory : str or Path
+        Where the results shall be; need not exist.
+    overwrite : bool
+        Whether earlier results there may be replaced.
+
+    Returns
+    -------
+    Path
+        The directory, absolute and without symbolic links.
+
+    Raises
+    ------
+    UsageError
+        It holds earlier results, which may not be replaced.
+    OutputError
+        It is a file, holds foreign files, or lies where nothing can be written.
+    """
+    target = Path(directory).resolve()
+    if target.exists() and not target.is_dir():
+        raise OutputError(f"{directory} is a file", "name a directory for the results")
+    try:
+        present = sorted(entry.name for entry in target.iterdir()) if target.exists() else []
+    except OSError as error:
+        raise _unwritable(directory, error) from error
+    if foreign := [name for name in present if name not in RESULT_FILES]:
+        raise OutputError(
+            f"{directory} holds files that are no results: {', '.join(foreign[:3])}", "choose a new directory"
+        )
+    if present and not overwrite:
+        raise UsageError(f"{directory} already holds results", "use --overwrite to replace them")
+    _check_parent(directory, target)
+    return target
+
+
+def _check_parent(directory: str | Path, target: Path) -> None:
+    parent = next(folder for folder in target.parents if folder.exists())
+    if not parent.is_dir():
+        raise OutputError(f"cannot write {directory}: {parent} is a file")
+    # Trying is surer than asking: permissions say nothing of read-only disks, and all is allowed to root.
+    try:
+        tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=parent).cleanup()
+    except OSError as error:
+        raise _unwritable(directory, error) from error
+
+
+@contextmanager
+def staged_directory(directory: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """Lend a temporary folder which takes the place of `directory` when the block ends without error.
+
+    Parameters
+    ----------
+    directory : str or Path
+        Where the results shall be.
+    overwrite : bool
+        Whether earlier results there may be replaced; they stay untouched until the new ones are whole.
+
+    Yields
+    ------
+    Path
+        The folder to write into; whatever it holds is flushed to disk before it is renamed.
+
+    Raises
+    ------
+    UsageError, OutputError
+        As by `check_directory`; any OSError inside the block becomes an OutputError.
+    """
+    target = check_directory(directory, overwrite=overwrite)
+    staged: Path | None = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        staged = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
+        yield staged
+        staged.chmod(0o777 & ~_umask())
+        for path in (*staged.iterdir(), staged):
+            _flush(path)
+        _publish(staged, target)
+        _flush(target.parent)
+    except OSError as error:
+        raise _unwritable(directory, error) from error
+    finally:
+        if staged is not None:
+            shutil.rmtree(staged, ignore_errors=True)
+
+
+def _publish(staged: Path, target: Path) -> None:
+    if not target.exists():
+        staged.rename(target)
+        return
+    retired = staged.with_suffix(".old")
+    try:
+        target.rename(retired)
+        staged.rename(target)
+    except BaseException:
+        if retired.exists() and not target.exists():
+            retired.rename(target)
+        raise
+    shutil.rmtree(retired, ignore_errors=True)
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+def _unwritable(directory: str | Path, error: OSError) -> OutputError:
+    hint = _HINTS.get(error.errno or 0, "")
+    return OutputError(f"cannot write {directory}: {error.strerror or error}", hint)

@@ -1,0 +1,66 @@
+"""All files of a results directory, written at once."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from glassslam.outputs.directory import staged_directory
+from glassslam.outputs.g2o import write_g2o
+from glassslam.outputs.map_server import write_map
+from glassslam.outputs.picture import write_picture
+from glassslam.outputs.report import Stopwatch, build_report
+from glassslam.outputs.trajectory import write_tum
+from glassslam.slam.result import MapResult
+
+
+def write_results(
+    result: MapResult,
+    directory: str | Path,
+    *,
+    overwrite: bool = False,
+    stopwatch: Stopwatch | None = None,
+) -> list[Path]:
+    """Write map, picture, trajectory, pose graph, configuration and report; all of them or none.
+
+    Parameters
+    ----------
+    result : MapResult
+        The finished run.
+    directory : str or Path
+        The results directory; it and its parents are made.
+    overwrite : bool
+        Whether earlier results there may be replaced.
+    stopwatch : Stopwatch, optional
+        Started at the beginning of the run; its reading goes into report.json.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    UsageError
+        The directory holds earlier results and `overwrite` is False.
+    OutputError
+        Something cannot be written; nothing is left behind and earlier results stay as they were.
+    """
+    target = Path(directory)
+    with staged_directory(target, overwrite=overwrite) as folder:
+        vertices = np.concatenate((result.submap_poses, result.node_poses))
+        written = [
+            *write_map(result.map, folder / "map.yaml"),
+            write_picture(result.map, result.trajectory, folder / "map.png"),
+            write_tum(result.trajectory, folder / "trajectory.tum"),
+            write_g2o(vertices, result.constraints, folder / "graph.g2o"),
+            folder / "config.yaml",
+            folder / "report.json",
+        ]
+        (folder / "config.yaml").write_text(result.config.dump(), encoding="utf-8")
+        # The report comes last: it tells what everything before it has cost.
+        report = build_report(result, stopwatch.read() if stopwatch else None)
+        (folder / "report.json").write_text(
+            json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
+    return [target / path.name for path in written]

@@ -1,0 +1,60 @@
+"""A simulation put on disk: the bag, and the truth beside it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from glassslam.records import Record
+from glassslam.simulation.rosbag1 import write_rosbag1
+from glassslam.simulation.simulate import Simulation
+from glassslam.simulation.truth import truth_paths, write_truth
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenRecording:
+    """What was written.
+
+    Attributes
+    ----------
+    bag, true_trajectory, true_plan : Path
+        The recording, the true poses (TUM) and the true surfaces (JSON).
+    scans : int
+        Number of scans in the bag.
+    """
+
+    bag: Path
+    true_trajectory: Path
+    true_plan: Path
+    scans: int
+
+
+def write_recording(
+    simulation: Simulation, bag: str | Path, progress: Callable[[float], None] | None = None
+) -> WrittenRecording:
+    """Write the bag of a simulation and the truth beside it; existing files are replaced.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        What to record.
+    bag : str or Path
+        Name of the ROS1 bag.
+    progress : callable, optional
+        Called with the recorded time so far, s.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    start = simulation.scene.start_time
+
+    def report(record: Record) -> None:
+        if progress is not None:
+            progress(record.stamp - start)
+
+    scans = write_rosbag1(simulation.records(), bag, simulation.scene.laser_pose, report)
+    for stale in truth_paths(bag):
+        stale.unlink(missing_ok=True)
+    trajectory, plan = write_truth(simulation, bag)
+    return WrittenRecording(Path(bag), trajectory, plan, scans)

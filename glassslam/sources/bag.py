@@ -1,0 +1,118 @@
+"""What every bag format offers, and how one is opened."""
+
+from collections.abc import Callable, Collection, Generator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from glassslam.sources.formats import Format, Piece
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+    from rosbags.typesys.store import Typestore
+
+LASER_SCAN = "sensor_msgs/msg/LaserScan"
+MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"
+ODOMETRY = "nav_msgs/msg/Odometry"
+IMU = "sensor_msgs/msg/Imu"
+TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+SCAN_TYPES = (LASER_SCAN, MULTI_ECHO)
+USED_TYPES = (*SCAN_TYPES, ODOMETRY, IMU, *TF_TYPES)
+
+_TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
+
+Decoder: TypeAlias = Callable[[bytes], Any]
+Raw: TypeAlias = tuple["Topic", int, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One stream of messages: its name, message type and number of messages."""
+
+    name: str
+    msgtype: str
+    count: int
+
+
+class Bag(Protocol):
+    """An opened bag file of any version.
+
+    Attributes
+    ----------
+    piece : Piece
+        The file and its format.
+    topics : tuple of Topic
+        Everything recorded.
+    start, end : int
+        Record times of the first and last message, ns; `end < start` when there is none.
+    """
+
+    piece: Piece
+    topics: tuple[Topic, ...]
+    start: int
+    end: int
+
+    def messages(
+        self, topics: Collection[Topic], start: int | None = None, stop: int | None = None
+    ) -> Generator[Raw, None, None]:
+        """Topic, record time in ns and serialised message, from `start` up to before `stop`."""
+        ...
+
+    def decoder(self, msgtype: str) -> Decoder:
+        """The function that turns a serialised message of this type into an object."""
+        ...
+
+    def session(self) -> AbstractContextManager[object]:
+        """Keep files open between several readings."""
+        ...
+
+
+def open_bag(piece: Piece) -> Bag:
+    """Open one bag file or directory.
+
+    Raises
+    ------
+    RecordingError
+        The file is damaged, not indexed, or not what it pretends to be.
+    """
+    if piece.format == "rosbag1":
+        from glassslam.sources.rosbag1 import Ros1Bag  # noqa: PLC0415  (rosbags is loaded for bags only)
+
+        return Ros1Bag(piece)
+    from glassslam.sources.rosbag2 import Ros2Bag  # noqa: PLC0415
+
+    return Ros2Bag(piece)
+
+
+def merge_topics(topics: Collection[Topic]) -> tuple[Topic, ...]:
+    """Topics of several connections or files added up by name and type, in order of appearance."""
+    counts: dict[tuple[str, str], int] = {}
+    for topic in topics:
+        key = (topic.name, topic.msgtype)
+        counts[key] = counts.get(key, 0) + topic.count
+    return tuple(Topic(name, msgtype, count) for (name, msgtype), count in counts.items())
+
+
+def typestore_for(connections: Collection["Connection"], format_name: Format) -> "Typestore":
+    """Message definitions as recorded, the common ones where a bag holds none."""
+    from rosbags.interfaces import MessageDefinitionFormat  # noqa: PLC0415
+    from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore  # noqa: PLC0415
+
+    own = get_typestore(Stores.EMPTY)
+    for connection in connections:
+        definition = connection.msgdef
+        if connection.msgtype not in USED_TYPES or connection.msgtype in own.fielddefs:
+            continue
+        if definition.format is not MessageDefinitionFormat.MSG:
+            break
+        try:
+            own.register(get_types_from_msg(definition.data, connection.msgtype))
+        except TypesysError:
+            break
+    else:
+        return own
+    common = get_typestore(Stores.ROS1_NOETIC if format_name == "rosbag1" else Stores.ROS2_HUMBLE)
+    for msgtype in TF_TYPES:
+        if msgtype not in common.fielddefs:
+            common.register(get_types_from_msg(_TF_DEFINITION, msgtype))
+    return common

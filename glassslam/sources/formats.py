@@ -1,0 +1,117 @@
+"""Which kind of recording a path is, told by its content."""
+
+import re
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from glassslam.errors import RecordingError
+from glassslam.sources.failures import reading
+
+Format: TypeAlias = Literal["rosbag1", "rosbag2-sqlite3", "rosbag2-mcap", "carmen"]
+
+GZIP_MAGIC = b"\x1f\x8b"
+KNOWN = "glassslam reads ROS1 bags, ROS2 bags (sqlite3, mcap; file or directory) and CARMEN logs"
+
+_MAGIC: tuple[tuple[bytes, Format], ...] = (
+    (b"#ROSBAG V2.0", "rosbag1"),
+    (b"\x89MCAP0\r\n", "rosbag2-mcap"),
+    (b"SQLite format 3\x00", "rosbag2-sqlite3"),
+)
+_REFUSED: tuple[tuple[bytes, str, str], ...] = (
+    (b"#ROSBAG", "a ROS1 bag of an old version", "convert it with 'rosbag fix'"),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "zstd-compressed",
+        "give the directory with its metadata.yaml, or unpack it with zstd",
+    ),
+    (b"BZh", "bzip2-compressed as a whole", "unpack it with bunzip2"),
+    (b"PK\x03\x04", "a zip archive", "unpack it"),
+)
+_CARMEN_LINE = re.compile(rb"^(?:FLASER|RLASER|ROBOTLASER\d|RAWLASER\d|ODOM|PARAM|SYNC)\s", re.MULTILINE)
+_HEAD_BYTES = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One file (or ROS2 directory with metadata) of a recording and its format."""
+
+    path: Path
+    format: Format
+
+
+def resolve(paths: Sequence[str | Path]) -> tuple[Piece, ...]:
+    """The consecutive pieces the paths stand for, all of one format.
+
+    Raises
+    ------
+    RecordingError
+        A path is missing, empty, foreign, or of another format than the rest.
+    """
+    pieces = tuple(piece for path in paths for piece in _expand(Path(path)))
+    if not pieces:
+        raise RecordingError("no recording was named", KNOWN)
+    formats = sorted({piece.format for piece in pieces})
+    if len(formats) > 1:
+        raise RecordingError(
+            f"the pieces of one recording must be of one format, found {' and '.join(formats)}",
+            "convert them to one format, or map them one by one",
+        )
+    return pieces
+
+
+def _expand(path: Path) -> tuple[Piece, ...]:
+    with reading(path):
+        if not path.exists():
+            raise RecordingError(f"{path} does not exist")
+        if not path.is_dir():
+            return (Piece(path, _detect(path)),)
+        files = sorted((p for p in path.iterdir() if p.suffix in {".mcap", ".db3"}), key=_natural_order)
+        if (path / "metadata.yaml").exists():
+            return (Piece(path, _directory_format(path, files)),)
+        if not files:
+            raise RecordingError(
+                f"{path} is a directory without a ROS2 bag in it", "name the files themselves"
+            )
+        return tuple(Piece(file, _detect(file)) for file in files)
+
+
+def _natural_order(path: Path) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+
+
+def _directory_format(path: Path, files: Sequence[Path]) -> Format:
+    """The storage of a directory with metadata; the compressed ones show it in the name only."""
+    names = [file.name for file in files] or [file.name for file in path.iterdir()]
+    if any(".mcap" in name for name in names):
+        return "rosbag2-mcap"
+    if any(".db3" in name for name in names):
+        return "rosbag2-sqlite3"
+    raise RecordingError(f"{path} has a metadata.yaml but neither .mcap nor .db3 files")
+
+
+def _detect(path: Path) -> Format:
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    if not head:
+        raise RecordingError(f"{path} is empty")
+    for magic, name in _MAGIC:
+        if head.startswith(magic):
+            return name
+    for magic, what, hint in _REFUSED:
+        if head.startswith(magic):
+            raise RecordingError(f"{path} is {what}", hint)
+    text = _inflate(head) if head.startswith(GZIP_MAGIC) else head
+    if b"\x00" not in text and _CARMEN_LINE.search(text):
+        return "carmen"
+    raise RecordingError(f"{path} is no recording known here", KNOWN)
+
+
+def _inflate(head: bytes) -> bytes:
+    """What the beginning of a gzip file unpacks to; nothing where it is broken."""
+    try:
+        return zlib.decompressobj(wbits=31).decompress(head, 4 * _HEAD_BYTES)
+    except zlib.error:
+        return b""

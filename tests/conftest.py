@@ -1,0 +1,73 @@
+"""What all tests share: where real recordings are, and a tiny finished run."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from glassslam.config import Config
+from glassslam.posegraph.graph import Constraint
+from glassslam.records import RecordingInfo, Trajectory
+from glassslam.slam.result import MapResult, OccupancyMap, RunStatistics, StageTime
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# the first call of a kernel compiles it, which no deadline foresees
+settings.register_profile("glassslam", deadline=None)
+settings.load_profile("glassslam")
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """Folder of the real recordings; tests that need it are skipped where it is absent."""
+    folder = Path(os.environ.get("GLASSSLAM_DATA", ROOT.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no real recordings at {folder}; set GLASSSLAM_DATA")
+    return folder
+
+
+def occupancy_map(drawing: str, resolution: float = 0.5, origin: tuple[float, float] = (0.0, 0.0)):
+    """A map drawn with the highest y on top: # occupied, . free, + undecided, ? never observed."""
+    values = {"#": 0.9, ".": 0.1, "+": 0.5, "?": np.nan}
+    rows = [[values[cell] for cell in line.strip()] for line in drawing.strip().splitlines()]
+    return OccupancyMap(np.array(rows[::-1], dtype=np.float32), resolution, origin)
+
+
+@pytest.fixture
+def draw_map():
+    return occupancy_map
+
+
+@pytest.fixture
+def tiny_result() -> MapResult:
+    """Two scans, one submap with two nodes, a map of 4 x 3 cells."""
+    return MapResult(
+        map=occupancy_map("####\n #..+\n ####\n".replace(" ", ""), origin=(-1.0, -0.5)),
+        trajectory=Trajectory(
+            np.array([1031745824.658, 1031745825.097833]), np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.1]])
+        ),
+        node_stamps=np.array([1031745824.658, 1031745825.097833]),
+        node_poses=np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.1]]),
+        submap_poses=np.array([[0.0, 0.0, 0.0]]),
+        constraints=(
+            Constraint(0, 1, np.zeros(3), np.diag([2.0, 2.0, 4.0]), "intra"),
+            Constraint(0, 2, np.array([0.3, 0.4, 0.1]), np.diag([2.0, 3.0, 4.0]), "loop"),
+        ),
+        config=Config(),
+        statistics=RunStatistics(
+            scans_read=2,
+            scans_used=2,
+            recording_seconds=0.44,
+            stages={"matching": StageTime(0.25, 0.5)},
+            nodes=2,
+            submaps=1,
+            closures_tried=3,
+            closures_accepted=1,
+            closures_rejected={"low score": 2},
+            residuals={"loop_translation_rms": 0.01},
+            warnings=["no odometry"],
+        ),
+        info=RecordingInfo(("run.clf.gz",), "carmen", 0.44, 2),
+    )

@@ -1,0 +1,88 @@
+import json
+
+import pytest
+
+from glassslam.cli import main
+from glassslam.evaluation import absolute_trajectory_error
+from glassslam.outputs import read_tum
+
+ROOM = """
+name: room
+walls: [{name: room, material: plaster, points: [[0, 0], [6, 0], [6, 6], [0, 6]], closed: true}]
+drive: {waypoints: [{at: [2, 3]}, {at: [4, 3]}]}
+"""
+
+
+@pytest.fixture
+def room(tmp_path):
+    path = tmp_path / "room.yaml"
+    path.write_text(ROOM, encoding="utf-8")
+    return path
+
+
+def test_simulate_writes_the_bag_and_the_truth_and_says_so(room, tmp_path, capsys):
+    bag = tmp_path / "out" / "room.bag"
+    assert main(["simulate", str(room), "-o", str(bag), "--sensor", "rplidar"]) == 0
+    out = capsys.readouterr().out
+    assert "scans of a rplidar, 2.0 m in" in out
+    for name in ("room.bag", "room.bag.truth.tum", "room.bag.truth.json"):
+        assert f"wrote {tmp_path / 'out' / name}" in out
+        assert (tmp_path / "out" / name).is_file()
+
+
+def test_simulate_tells_scripts_in_json(room, tmp_path, capsys):
+    bag = tmp_path / "room.bag"
+    assert main(["simulate", str(room), "-o", str(bag), "--sensor", "lms200", "--seed", "4", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["scene"], told["sensor"], told["seed"], told["bag"]) == ("room", "lms200", 4, str(bag))
+    assert told["scans"] == read_tum(told["true_trajectory"]).stamps.size
+
+
+def test_simulate_does_not_replace_a_bag_unasked(room, tmp_path, capsys):
+    bag = tmp_path / "room.bag"
+    bag.write_text("precious")
+    assert main(["simulate", str(room), "-o", str(bag)]) == 2
+    assert capsys.readouterr().err == f"error: {bag} exists already (use --overwrite to replace it)\n"
+    assert bag.read_text() == "precious"
+    assert main(["simulate", str(room), "-o", str(bag), "--sensor", "rplidar", "--overwrite"]) == 0
+    assert bag.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["castle"], "error: no scene 'castle' (give the path of a scene file or one of: office"),
+        (["office", "--sensor", "vlp16"], "error: no lidar 'vlp16' (known: ust10lx, "),
+    ],
+)
+def test_simulate_refuses_what_it_does_not_know(words, message, tmp_path, capsys):
+    assert main(["simulate", *words, "-o", str(tmp_path / "x.bag")]) == 2
+    assert capsys.readouterr().err.startswith(message)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_demo_does_not_mix_with_other_files(tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("precious")
+    assert main(["demo", "-o", str(tmp_path)]) == 1
+    assert (
+        capsys.readouterr().err
+        == f"error: {tmp_path} holds other files: thesis.tex (choose a new directory)\n"
+    )
+    (tmp_path / "file").write_text("")
+    assert main(["demo", "-o", str(tmp_path / "file")]) == 1
+    assert "is a file (name a directory for the demo)" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_demo_maps_the_office_and_says_how_good_the_map_is(tmp_path, capsys):
+    folder = tmp_path / "demo"
+    assert main(["demo", "-o", str(folder)]) == 0
+    out = capsys.readouterr().out
+    assert f"look at {folder / 'map' / 'map.png'}" in out
+    assert (folder / "map" / "map.yaml").is_file()
+    truth = read_tum(folder / "demo.bag.truth.tum")
+    estimate = read_tum(folder / "map" / "trajectory.tum")
+    errors = absolute_trajectory_error(estimate, truth)
+    assert errors.count == truth.stamps.size
+    assert errors.translation.rmse < 0.05
+    assert f"against the truth: {100 * errors.translation.rmse:.1f} cm rms" in out
