@@ -46,5 +46,9 @@ class EvaluationError(GlassSlamError):
     """A truth file that does not fit the result."""
 
 
+class GridError(GlassSlamError):
+    """A probability grid, or a scan entered into one or matched against it, that makes no sense."""
+
+
 class GraphError(GlassSlamError):
     """A pose graph that cannot be built or solved."""

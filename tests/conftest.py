@@ -50,10 +50,10 @@ def tiny_result() -> MapResult:
         ),
         node_stamps=np.array([1031745824.658, 1031745825.097833]),
         node_poses=np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.1]]),
-        submap_poses=np.array([[0.0, 0.0, 0.0]]),
+        submap_nodes=(0,),
         constraints=(
-            Constraint(0, 1, np.zeros(3), np.diag([2.0, 2.0, 4.0]), "intra"),
-            Constraint(0, 2, np.array([0.3, 0.4, 0.1]), np.diag([2.0, 3.0, 4.0]), "loop"),
+            Constraint(0, 1, np.array([0.3, 0.4, 0.1]), np.diag([2.0, 2.0, 4.0]), "odometry"),
+            Constraint(0, 1, np.array([0.3, 0.4, 0.1]), np.diag([2.0, 3.0, 4.0]), "loop"),
         ),
         config=Config(),
         statistics=RunStatistics(

@@ -82,7 +82,8 @@ UNARY = [
 ]  # fmt: skip
 BINARY = ["plus", "minus", "times", "rdivide", "power", "fmin", "fmax", "atan2", "fmod", "copysign", "hypot"]
 DOMAIN = {"sqrt": (0.1, 4), "log": (0.1, 4), "asin": (-0.9, 0.9), "acos": (-0.9, 0.9), "acosh": (1.1, 4),
-          "atanh": (-0.9, 0.9), "log1p": (-0.5, 3), "power": (0.1, 3)}  # fmt: skip
+          "atanh": (-0.9, 0.9), "log1p": (-0.5, 3), "power": (0.1, 3),
+          "fmod": (0.2, 3), "rdivide": (0.2, 3)}  # fmt: skip
 
 
 def all_operations() -> tuple[ca.Function, list[tuple[float, float]]]:

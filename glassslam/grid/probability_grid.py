@@ -1,69 +1,36 @@
 """A growable probability grid with odds updates (Hess et al. 2016, section IV; METHODS.md, section 0)."""
 
-import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.grid.kernels import LOG_ODDS_STEP, insert_scan
+from glassslam.errors import GridError
+from glassslam.grid.kernels import Cells, insert_scan
+from glassslam.grid.odds import OddsModel
 from glassslam.records import Float32Array, FloatArray
 
 _MARGIN_CELLS = 48
+_CROP_MARGIN_CELLS = 3  # the bicubic neighbourhood of a border cell stays inside
 _LAST_MARK = np.iinfo(np.uint16).max
 
-
-def log_odds(probability: float) -> float:
-    """Natural logarithm of p / (1 - p)."""
-    return math.log(probability / (1.0 - probability))
+__all__ = ["OddsModel", "ProbabilityGrid", "point_array"]
 
 
-@dataclass(frozen=True, slots=True)
-class OddsModel:
-    """How observations change a cell.
+def point_array(points: Any) -> FloatArray:
+    """Points (n, 2) as the kernels need them; an empty sequence is no point.
 
-    Attributes
-    ----------
-    hit_probability, miss_probability : float
-        P(occupied) after one return in, or one ray through, a cell of even odds.
-    lower_probability, upper_probability : float
-        Clamp of the cells.
-    unknown_probability : float
-        What a cell never observed reads as in scan matching.
+    Raises
+    ------
+    GridError
+        The shape is another one.
     """
-
-    hit_probability: float = 0.55
-    miss_probability: float = 0.49
-    lower_probability: float = 0.12
-    upper_probability: float = 0.98
-    unknown_probability: float = 0.5
-
-    @property
-    def hit_step(self) -> int:
-        """Change of a cell value by a hit."""
-        return round(log_odds(self.hit_probability) / LOG_ODDS_STEP)
-
-    @property
-    def miss_step(self) -> int:
-        """Change of a cell value by a miss."""
-        return round(log_odds(self.miss_probability) / LOG_ODDS_STEP)
-
-    @property
-    def prior(self) -> int:
-        """Cell value of even odds."""
-        return 1 + round(-log_odds(self.lower_probability) / LOG_ODDS_STEP)
-
-    @property
-    def top(self) -> int:
-        """Largest cell value."""
-        span = log_odds(self.upper_probability) - log_odds(self.lower_probability)
-        return 1 + round(span / LOG_ODDS_STEP)
-
-    def table(self) -> Float32Array:
-        """P(occupied) of every cell value, shape (top + 1,); entry 0 is that of unknown cells."""
-        odds = log_odds(self.lower_probability) + LOG_ODDS_STEP * np.arange(self.top)
-        known = 1.0 / (1.0 + np.exp(-odds))
-        return np.concatenate(([self.unknown_probability], known)).astype(np.float32)
+    array = np.ascontiguousarray(points, dtype=np.float64)
+    if array.size == 0:
+        return np.empty((0, 2))
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise GridError(f"points of shape {array.shape}", "give an array of shape (n, 2)")
+    return array
 
 
 class ProbabilityGrid:
@@ -76,6 +43,20 @@ class ProbabilityGrid:
     odds : OddsModel
         Update and clamp of the cells.
 
+    Attributes
+    ----------
+    origin : ndarray of float64, shape (2,)
+        Lower left corner of the cell (0, 0), m; always a whole number of cells from (0, 0).
+    cells : ndarray of uint16, shape (rows, columns)
+        Columns run along x, rows along y; 0 is never observed, see `OddsModel.table` for the rest.
+    table : ndarray of float32
+        P(occupied) of every cell value, as scan matching reads it.
+
+    Raises
+    ------
+    GridError
+        A resolution that is not positive.
+
     Examples
     --------
     >>> import numpy as np
@@ -86,12 +67,14 @@ class ProbabilityGrid:
     """
 
     def __init__(self, resolution: float = 0.05, odds: OddsModel | None = None) -> None:
+        if not (np.isfinite(resolution) and resolution > 0):
+            raise GridError(f"resolution of a grid is {resolution} m", "it must be positive")
         self.resolution = resolution
         self.odds = odds or OddsModel()
         self.table = self.odds.table()
         self.origin = np.zeros(2)
-        self.cells: NDArray[np.uint16] = np.zeros((0, 0), dtype=np.uint16)
-        self._marks: NDArray[np.uint16] = np.zeros((0, 0), dtype=np.uint16)
+        self.cells: Cells = np.zeros((0, 0), dtype=np.uint16)
+        self._marks: Cells = np.zeros((0, 0), dtype=np.uint16)
         self._mark = 0
         self._steps = (self.odds.hit_step, self.odds.miss_step, self.odds.prior, self.odds.top)
 
@@ -106,8 +89,14 @@ class ProbabilityGrid:
             Returns in the frame of the grid, m.
         free_ends : ndarray of float64, shape (m, 2)
             Ends of the free space of beams without echo, m.
+
+        Raises
+        ------
+        GridError
+            A coordinate that is not finite, or an array of another shape.
         """
-        self._contain(sensor, hits, free_ends)
+        sensor, hits, free_ends = point_array([sensor])[0], point_array(hits), point_array(free_ends)
+        self._contain(np.concatenate((sensor[None], hits, free_ends)))
         if self._mark == _LAST_MARK:
             self._marks[:] = 0
             self._mark = 0
@@ -120,19 +109,17 @@ class ProbabilityGrid:
 
     def finish(self) -> None:
         """Crop to the observed cells and drop what only insertion needs."""
-        rows, columns = np.flatnonzero(self.cells.any(axis=1)), np.flatnonzero(self.cells.any(axis=0))
         self._marks = np.zeros((0, 0), dtype=np.uint16)
+        rows, columns = np.flatnonzero(self.cells.any(axis=1)), np.flatnonzero(self.cells.any(axis=0))
         if rows.size == 0:
             return
-        margin = 3  # the bicubic neighbourhood of a border cell stays inside
-        r0, c0 = int(rows[0]) - margin, int(columns[0]) - margin
-        r1, c1 = int(rows[-1]) + 1 + margin, int(columns[-1]) + 1 + margin
-        cropped = np.zeros((r1 - r0, c1 - c0), dtype=np.uint16)
-        inside = self.cells[max(r0, 0) : r1, max(c0, 0) : c1]
-        top, left = max(-r0, 0), max(-c0, 0)
-        cropped[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
-        self.cells = cropped
-        self.origin = self.origin + np.array([c0, r0]) * self.resolution
+        first = np.array([columns[0], rows[0]]) - _CROP_MARGIN_CELLS
+        last = np.array([columns[-1], rows[-1]]) + 1 + _CROP_MARGIN_CELLS
+        low, high = np.maximum(first, 0), np.minimum(last, self.cells.shape[::-1])
+        inside = self.cells[low[1] : high[1], low[0] : high[0]]
+        # a copy even where nothing is cut: a view would keep the large grid alive
+        self.cells = _padded(inside, low - first, last - high)
+        self.origin = self._corner_moved_by(first)
 
     def probability(self) -> Float32Array:
         """P(occupied) of all cells, shape (rows, columns); NaN where never observed."""
@@ -150,26 +137,34 @@ class ProbabilityGrid:
         out[inside] = np.where(values == 0, np.nan, self.table[values])
         return out
 
-    def _contain(self, sensor: FloatArray, hits: FloatArray, free_ends: FloatArray) -> None:
+    def _contain(self, points: FloatArray) -> None:
         """Grow until all points lie inside with a margin for the bicubic neighbourhood."""
-        low, high = sensor.copy(), sensor.copy()
-        for points in (hits, free_ends):
-            if len(points):
-                np.minimum(low, points.min(axis=0), out=low)
-                np.maximum(high, points.max(axis=0), out=high)
+        low, high = points.min(axis=0), points.max(axis=0)
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            raise GridError("scan with a coordinate that is not finite", "leave out invalid beams")
         if self.cells.size == 0:
-            self.origin = np.floor(sensor / self.resolution) * self.resolution
+            self.origin = np.floor(points[0] / self.resolution) * self.resolution
+        if self._marks.shape != self.cells.shape:  # finished before
+            self._marks, self._mark = np.zeros_like(self.cells), 0
         first = np.floor((low - self.origin) / self.resolution).astype(np.int64)
         last = np.floor((high - self.origin) / self.resolution).astype(np.int64)
-        rows, columns = self.cells.shape
+        size = np.array(self.cells.shape[::-1])
         before = np.where(first < 2, _MARGIN_CELLS - np.minimum(first, 0), 0)
-        after = np.where(last >= np.array([columns, rows]) - 2, _MARGIN_CELLS + last - [columns, rows], 0)
-        after = np.maximum(after, 0)
+        after = np.where(last >= size - 2, np.maximum(_MARGIN_CELLS + last - size, 0), 0)
         if before.any() or after.any():
-            self._grow(before, after)
+            self.cells = _padded(self.cells, before, after)
+            self._marks = _padded(self._marks, before, after)
+            self.origin = self._corner_moved_by(-before)
 
-    def _grow(self, before: NDArray[np.int64], after: NDArray[np.int64]) -> None:
-        widths = ((int(before[1]), int(after[1])), (int(before[0]), int(after[0])))
-        self.cells = np.pad(self.cells, widths)
-        self._marks = np.pad(self._marks, widths)
-        self.origin = self.origin - before * self.resolution
+    def _corner_moved_by(self, columns_and_rows: NDArray[np.int64]) -> FloatArray:
+        """Origin moved by whole cells, the same bits whatever way the grid came to its size."""
+        corner = np.rint(self.origin / self.resolution) + columns_and_rows
+        return np.asarray(corner * self.resolution)
+
+
+def _padded(cells: Cells, before: NDArray[np.int64], after: NDArray[np.int64]) -> Cells:
+    """Copy of cells with unknown ones around; (columns, rows) before and after."""
+    size = cells.shape[::-1] + before + after
+    out = np.zeros((size[1], size[0]), dtype=np.uint16)
+    out[before[1] : before[1] + cells.shape[0], before[0] : before[0] + cells.shape[1]] = cells
+    return out

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from glassslam.grid.probability_grid import OddsModel, ProbabilityGrid
+from glassslam.grid.odds import OddsModel
+from glassslam.grid.probability_grid import ProbabilityGrid
 from glassslam.records import FloatArray
 
 

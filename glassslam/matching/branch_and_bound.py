@@ -67,7 +67,7 @@ class BranchAndBoundMatcher:
         self.cell = grid.resolution * coarsening
         self.origin = grid.origin.copy()
         self._reach = math.ceil(max_linear_window / self.cell)
-        depth = max(1, int(math.log2(self._reach)))
+        depth = int(math.log2(max(1, self._reach))) + 1
         self._pad = 2 * self._reach + (1 << depth)
         rows, columns = (-(-n // coarsening) for n in grid.cells.shape)
         self._shape = (rows, columns)

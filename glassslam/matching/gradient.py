@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glassslam.grid.probability_grid import ProbabilityGrid
-from glassslam.matching.kernels import align
+from glassslam.config import Solver
+from glassslam.errors import GridError
+from glassslam.grid.probability_grid import ProbabilityGrid, point_array
+from glassslam.matching.kernels import align, normal_equations
+from glassslam.matching.problem import MatchProblem
 from glassslam.records import FloatArray
 
 
@@ -40,6 +43,8 @@ def match_scan(
     translation_weight: float = 0.0,
     rotation_weight: float = 0.0,
     max_iterations: int = 20,
+    tolerance: float = 1e-3,
+    solver: Solver = "lm",
 ) -> MatchResult:
     """Pose of least cost near a prediction.
 
@@ -57,7 +62,17 @@ def match_scan(
     occupied_space_weight, translation_weight, rotation_weight : float
         Weights of the residuals; 1, 1/m and 1/rad.
     max_iterations : int
-        Most evaluations of the normal equations.
+        Most steps tried.
+    tolerance : float
+        Where to stop: "lm" when a step is shorter (m; a third of it in rad) or saves a smaller share
+        of the cost, "casadi" when the gradient is smaller.
+    solver : {"lm", "casadi"}
+        The project's Levenberg-Marquardt loop, or CasADi's sqpmethod on the same kernel.
+
+    Raises
+    ------
+    GridError
+        Points of another shape, or an unknown solver.
 
     Examples
     --------
@@ -71,15 +86,22 @@ def match_scan(
     >>> bool(np.abs(result.pose).max() < 0.01)
     True
     """
-    pose, information = np.empty(3), np.empty((3, 3))
-    count = max(len(points), 1)
-    weight = occupied_space_weight**2 / count
+    points = point_array(points)
     prior = np.array([translation_weight**2, translation_weight**2, rotation_weight**2])
-    start = np.asarray(prediction, dtype=np.float64)
-    cost, iterations = align(
-        grid.cells, grid.table, grid.origin, 1.0 / grid.resolution, points, start, prior, weight,
-        max_iterations, pose, information,
-    )  # fmt: skip
-    spent = cost - float(prior @ (pose - start) ** 2)
+    start = np.array(prediction, dtype=np.float64)
+    weight = occupied_space_weight**2 / max(len(points), 1)
+    problem = MatchProblem(grid, points, start, prior, weight)
+    pose, information = np.empty(3), np.empty((3, 3))
+    if solver == "casadi":
+        from glassslam.matching import sqp  # noqa: PLC0415  (0.16 s)
+
+        pose, iterations = sqp.minimise(problem, max_iterations, tolerance)
+        spent = weight * normal_equations(*problem.arguments[:5], pose, information, np.empty(3))
+        information *= weight
+    elif solver == "lm":
+        cost, iterations = align(*problem.arguments, max_iterations, pose, information, tolerance)
+        spent = cost - float(prior @ (pose - start) ** 2)
+    else:
+        raise GridError(f"unknown solver {solver!r}", "known are lm and casadi")
     residual = float(np.sqrt(max(spent, 0.0))) / occupied_space_weight
     return MatchResult(pose, residual, information / occupied_space_weight**2, iterations)

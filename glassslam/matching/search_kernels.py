@@ -1,14 +1,24 @@
-"""Kernels of the correlative searches: max grids, discretised scans, branch and bound (Hess et al. 2016, section V)."""
+"""Kernels of the correlative searches: max grids, discretised scans, branch and bound, exhaustive search.
+
+Branch and bound follows Hess et al. 2016, section V.
+"""
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glassslam.accelerate import kernel
+from glassslam.grid.kernels import Cells
+from glassslam.records import Float32Array, FloatArray
+
+Bytes = NDArray[np.uint8]
+Int32s = NDArray[np.int32]
+Integers = NDArray[np.int64]
 
 
 @kernel
-def max_over_windows(source, shift, out):  # type: ignore[no-untyped-def]
+def max_over_windows(source: Bytes, shift: int, out: Bytes) -> None:
     """out[y, x] = max of source over the window (y .. y + shift, x .. x + shift) of corners `shift` apart.
 
     Doubling the window of a grid that already holds maxima over windows of edge `shift`.
@@ -18,11 +28,11 @@ def max_over_windows(source, shift, out):  # type: ignore[no-untyped-def]
         y2 = min(y + shift, rows - 1)
         for x in range(columns):
             x2 = min(x + shift, columns - 1)
-            out[y, x] = max(max(source[y, x], source[y, x2]), max(source[y2, x], source[y2, x2]))
+            out[y, x] = max(source[y, x], source[y, x2], source[y2, x], source[y2, x2])
 
 
 @kernel
-def quantise(cells, scores, factor, pad, out):  # type: ignore[no-untyped-def]
+def quantise(cells: Cells, scores: Float32Array, factor: int, pad: int, out: Bytes) -> None:
     """Scores of a cell grid as bytes, the maximum of each factor x factor block, `pad` zeros around."""
     rows, columns = cells.shape
     for y in range(rows):
@@ -31,14 +41,25 @@ def quantise(cells, scores, factor, pad, out):  # type: ignore[no-untyped-def]
             if value:
                 byte = np.uint8(scores[value] * 255.0 + 0.5)
                 r, c = y // factor + pad, x // factor + pad
-                if byte > out[r, c]:
-                    out[r, c] = byte
+                out[r, c] = max(out[r, c], byte)
 
 
 @kernel
-def discretise(  # type: ignore[no-untyped-def]
-    points, x, y, first_angle, angle_step, count, inverse_cell, rows, columns, pad, reach, index, lengths
-):
+def discretise(
+    points: FloatArray,
+    x: float,
+    y: float,
+    first_angle: float,
+    angle_step: float,
+    count: int,
+    inverse_cell: float,
+    rows: int,
+    columns: int,
+    pad: int,
+    reach: int,
+    index: Int32s,
+    lengths: Integers,
+) -> None:
     """Flat indices into a padded grid of the scan turned by each candidate angle.
 
     Points that no offset of the search brings into the grid are left out. `lengths[a]` is the
@@ -51,8 +72,8 @@ def discretise(  # type: ignore[no-untyped-def]
         n = 0
         for k in range(points.shape[0]):
             px, py = points[k, 0], points[k, 1]
-            c = int(math.floor((cosine * px - sine * py + x) * inverse_cell))
-            r = int(math.floor((sine * px + cosine * py + y) * inverse_cell))
+            c = math.floor((cosine * px - sine * py + x) * inverse_cell)
+            r = math.floor((sine * px + cosine * py + y) * inverse_cell)
             if -reach <= c < columns + reach and -reach <= r < rows + reach:
                 index[a, n] = (r + pad) * stride + c + pad
                 n += 1
@@ -60,15 +81,23 @@ def discretise(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _score(level, index, a, n, offset):  # type: ignore[no-untyped-def]
-    total = np.int64(0)
+def _score(level: Bytes, index: Int32s, a: int, n: int, offset: int) -> int:
+    total = 0
     for k in range(n):
         total += level[index[a, k] + offset]
     return total
 
 
 @kernel
-def _coarse_scores(level, stride, index, lengths, window, step, scores):  # type: ignore[no-untyped-def]
+def _coarse_scores(
+    level: Bytes,
+    stride: int,
+    index: Int32s,
+    lengths: Integers,
+    window: int,
+    step: int,
+    scores: NDArray[np.int32],
+) -> None:
     """Upper bounds of all coarse candidates, shape (angles, offsets_y, offsets_x)."""
     for a in range(index.shape[0]):
         for iy in range(scores.shape[1]):
@@ -78,10 +107,56 @@ def _coarse_scores(level, stride, index, lengths, window, step, scores):  # type
 
 
 @kernel
-def _descend(levels, stride, index, lengths, window, start_level, a, dx, dy, best, found, stack):  # type: ignore[no-untyped-def]
-    """Depth-first search below one coarse candidate; the best leaf goes into `found`, its score is returned."""
+def _better_children(
+    level: Bytes,
+    stride: int,
+    index: Int32s,
+    lengths: Integers,
+    window: int,
+    half: int,
+    parent: tuple[int, int, int],
+    best: int,
+    child: Integers,
+) -> int:
+    """Write the quarters (score, dx, dy) of a candidate that beat `best`, rising by score; their number."""
+    a, x, y = parent
+    count = 0
+    for quarter in range(4):
+        nx, ny = x + (quarter & 1) * half, y + (quarter >> 1) * half
+        if nx > window or ny > window:
+            continue
+        score = _score(level, index, a, lengths[a], ny * stride + nx)
+        if score <= best:
+            continue
+        at = count
+        while at > 0 and child[at - 1, 0] > score:
+            child[at] = child[at - 1]
+            at -= 1
+        child[at, 0], child[at, 1], child[at, 2] = score, nx, ny
+        count += 1
+    return count
+
+
+@kernel
+def _descend(
+    levels: Bytes,
+    stride: int,
+    index: Int32s,
+    lengths: Integers,
+    window: int,
+    start_level: int,
+    candidate: tuple[int, int, int, int],
+    best: int,
+    found: Integers,
+    stack: Integers,
+) -> int:
+    """Depth-first search below one coarse candidate (angle, dx, dy, bound) better than `best`.
+
+    The best leaf goes into `found`, its score is returned.
+    """
     top = 0
-    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = start_level, dx, dy, best + 1
+    a = candidate[0]
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = start_level, candidate[1], candidate[2], candidate[3]
     child = np.empty((4, 3), dtype=np.int64)
     while top >= 0:
         level, x, y, bound = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
@@ -92,22 +167,9 @@ def _descend(levels, stride, index, lengths, window, start_level, a, dx, dy, bes
             best = bound
             found[0], found[1], found[2] = a, x, y
             continue
-        half = 1 << (level - 1)
-        count = 0
-        for cy in range(2):
-            for cx in range(2):
-                nx, ny = x + cx * half, y + cy * half
-                if nx > window or ny > window:
-                    continue
-                score = _score(levels[level - 1], index, a, lengths[a], ny * stride + nx)
-                if score <= best:
-                    continue
-                at = count
-                while at > 0 and child[at - 1, 0] > score:  # best child last: it is popped first
-                    child[at] = child[at - 1]
-                    at -= 1
-                child[at, 0], child[at, 1], child[at, 2] = score, nx, ny
-                count += 1
+        count = _better_children(
+            levels[level - 1], stride, index, lengths, window, 1 << (level - 1), (a, x, y), best, child
+        )
         for c in range(count):
             top += 1
             stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = (
@@ -117,7 +179,16 @@ def _descend(levels, stride, index, lengths, window, start_level, a, dx, dy, bes
 
 
 @kernel
-def branch_and_bound(levels, stride, index, lengths, window, start_level, threshold, found):  # type: ignore[no-untyped-def]
+def branch_and_bound(
+    levels: Bytes,
+    stride: int,
+    index: Int32s,
+    lengths: Integers,
+    window: int,
+    start_level: int,
+    threshold: int,
+    found: Integers,
+) -> int:
     """Best (angle, dx, dy) with a score sum above `threshold`; returns the score, or `threshold` when none.
 
     `levels` has shape (depth, cells of the padded grid): level h holds maxima over windows of edge 2^h.
@@ -136,15 +207,26 @@ def branch_and_bound(levels, stride, index, lengths, window, start_level, thresh
         a = k // (offsets * offsets)
         dy = (k // offsets) % offsets * step - window
         dx = k % offsets * step - window
-        best = _descend(levels, stride, index, lengths, window, start_level, a, dx, dy, best, found, stack)
+        candidate = (a, dx, dy, int(flat[k]))
+        best = _descend(levels, stride, index, lengths, window, start_level, candidate, best, found, stack)
     return best
 
 
 @kernel
-def exhaustive_search(  # type: ignore[no-untyped-def]
-    cells, table, origin, inverse_resolution, points, guess, steps, angle_steps, angle_step, translation_cost,
-    rotation_cost, pose
-):  # fmt: skip
+def exhaustive_search(
+    cells: Cells,
+    table: Float32Array,
+    origin: FloatArray,
+    inverse_resolution: float,
+    points: FloatArray,
+    guess: FloatArray,
+    steps: int,
+    angle_steps: int,
+    angle_step: float,
+    translation_cost: float,
+    rotation_cost: float,
+    pose: FloatArray,
+) -> float:
     """Best pose on the raster of cells and angles around a guess; returns its penalised score.
 
     Score: mean P(occupied) of the cells hit, times exp(-(translation_cost |t| + rotation_cost |theta|)^2)
@@ -159,8 +241,8 @@ def exhaustive_search(  # type: ignore[no-untyped-def]
         sums = np.zeros((side, side), dtype=np.float32)
         for k in range(count):
             px, py = points[k, 0], points[k, 1]
-            c = int(math.floor((cosine * px - sine * py + guess[0] - origin[0]) * inverse_resolution)) - steps
-            r = int(math.floor((sine * px + cosine * py + guess[1] - origin[1]) * inverse_resolution)) - steps
+            c = math.floor((cosine * px - sine * py + guess[0] - origin[0]) * inverse_resolution) - steps
+            r = math.floor((sine * px + cosine * py + guess[1] - origin[1]) * inverse_resolution) - steps
             if c < 0 or r < 0 or c + side > columns or r + side > rows:
                 continue
             for dy in range(side):

@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
-
 from glassslam.outputs.directory import staged_directory
 from glassslam.outputs.g2o import write_g2o
 from glassslam.outputs.map_server import write_map
@@ -48,12 +46,11 @@ def write_results(
     """
     target = Path(directory)
     with staged_directory(target, overwrite=overwrite) as folder:
-        vertices = np.concatenate((result.submap_poses, result.node_poses))
         written = [
             *write_map(result.map, folder / "map.yaml"),
             write_picture(result.map, result.trajectory, folder / "map.png"),
             write_tum(result.trajectory, folder / "trajectory.tum"),
-            write_g2o(vertices, result.constraints, folder / "graph.g2o"),
+            write_g2o(result.node_poses, result.constraints, folder / "graph.g2o"),
             folder / "config.yaml",
             folder / "report.json",
         ]

@@ -22,7 +22,7 @@ def relative_covariances(system: System, poses: FloatArray, pairs: Integers) -> 
         Vertices a and b; infinite covariance when no edges lead from one to the other.
     """
     s = system.structure
-    out = np.empty((len(pairs), 3, 3))
+    out = np.zeros((len(pairs), 3, 3))
     covariance_kernels.relative_covariances(
         poses, pairs, s.variable, s.parent, s.factor_start,
         system.factor_row, system.factor, system.inverse, out,

@@ -119,9 +119,11 @@ def factorise(
     """
     n = parent.size
     seen_by, pattern, filled = index_work[0], index_work[1], index_work[2]
-    seen_by[:] = -1
-    filled[:] = factor_start[:n]
-    work[:] = 0.0
+    # loops, because numba takes seconds to compile assignments of whole arrays
+    for k in range(n):
+        seen_by[k], filled[k] = -1, factor_start[k]
+        for c in range(9):
+            work[k, c] = 0.0
     pivot = work[n]
     for k in range(n):
         top = _row_pattern(k, column_start, row, parent, seen_by, pattern)

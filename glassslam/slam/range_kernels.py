@@ -3,15 +3,27 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glassslam.accelerate import kernel
+from glassslam.records import Float32Array, FloatArray
 
 
 @kernel
-def beams_to_points(  # type: ignore[no-untyped-def]
-    ranges, angle_min, increment, time_increment, base_from_laser, twist, nearest, farthest, no_echo, ray_length,
-    points, free
-):  # fmt: skip
+def beams_to_points(
+    ranges: Float32Array,
+    angle_min: float,
+    increment: float,
+    time_increment: float,
+    base_from_laser: FloatArray,
+    twist: FloatArray,
+    nearest: float,
+    farthest: float,
+    no_echo: float,
+    ray_length: float,
+    points: FloatArray,
+    free: FloatArray,
+) -> tuple[int, int]:
     """Write returns and free-ray ends in the base frame at the stamp of the scan; the two counts.
 
     The base moves with a constant twist during the sweep. A beam of at least `no_echo` clears `ray_length`;
@@ -50,7 +62,7 @@ def beams_to_points(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def voxel_filter(points, edge):  # type: ignore[no-untyped-def]
+def voxel_filter(points: FloatArray, edge: float) -> NDArray[np.int64]:
     """Indices of the first point in every voxel, in order (open-addressing hash of the voxel numbers)."""
     count = points.shape[0]
     size = 1

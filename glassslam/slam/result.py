@@ -91,10 +91,10 @@ class MapResult:
         Times of the nodes, s.
     node_poses : ndarray of float64, shape (n, 3)
         Optimised poses of the base at the nodes, map frame.
-    submap_poses : ndarray of float64, shape (m, 3)
-        Optimised poses of the submap frames, map frame.
+    submap_nodes : tuple of int
+        First node of every submap.
     constraints : tuple of Constraint
-        Edges of the pose graph; submap k is vertex k, node i is vertex `len(submap_poses) + i`.
+        Edges of the pose graph; vertex i is node i.
     config : Config
         The resolved configuration.
     statistics : RunStatistics
@@ -107,7 +107,7 @@ class MapResult:
     trajectory: Trajectory
     node_stamps: FloatArray
     node_poses: FloatArray
-    submap_poses: FloatArray
+    submap_nodes: tuple[int, ...]
     constraints: tuple[Constraint, ...]
     config: Config
     statistics: RunStatistics

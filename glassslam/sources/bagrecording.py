@@ -15,6 +15,7 @@ from glassslam.sources.recording import Recording
 from glassslam.sources.transforms import Edge, frame_name
 
 Handler = Callable[[bytes, int], Iterator[Record]]
+Convert = Callable[[Any, int], Any]
 
 
 def open_bags(pieces: Sequence[Piece], options: SourceOptions) -> "BagRecording":
@@ -65,7 +66,7 @@ class BagRecording(Recording):
         if topic.name == choice.scan.name and topic.msgtype == choice.scan.msgtype:
             convert = messages.echo_scan if topic.msgtype == MULTI_ECHO else messages.laser_scan
             return partial(self._scan, scan_decoder(bag, topic, self._options.echo), convert)
-        decode = _guarded(bag.decoder(topic.msgtype))
+        decode = bag.decoder(topic.msgtype)
         if choice.odometry and topic.name == choice.odometry.name:
             return partial(_one, decode, messages.odometry)
         if choice.imu and topic.name == choice.imu.name:
@@ -84,41 +85,48 @@ class BagRecording(Recording):
         self._scans_seen += 1
         if (self._scans_seen - 1) % self._options.every:
             return
-        message = _guarded(decode)(raw)
-        if messages.has_foreign_intensities(message):
-            self._warn("intensities that do not belong to the beams one by one are ignored")
-        yield convert(message, time, self._found.mount)
+
+        def checked(message: Any, time: int) -> LaserScan:
+            if messages.has_foreign_intensities(message):
+                self._warn("intensities that do not belong to the beams one by one are ignored")
+            return convert(message, time, self._found.mount)
+
+        yield _convert(decode, checked, raw, time)
 
     def _transforms(
         self, decode: Callable[[bytes], Any], edge: Edge, raw: bytes, time: int
     ) -> Iterator[Record]:
-        for stamped in decode(raw).transforms:
-            names = frame_name(stamped.header.frame_id), frame_name(stamped.child_frame_id)
-            if names == (edge.parent, edge.child):
-                try:
-                    record = messages.odometry_from_transform(stamped, time)
-                except UnusableMessageError as error:
-                    self._drop(str(error))
-                else:
-                    yield record
+        for stamped in _convert(decode, lambda message, _: _links(message, edge), raw, time):
+            try:
+                record = messages.odometry_from_transform(stamped, time)
+            except UnusableMessageError as error:
+                self._drop(str(error))
+            else:
+                yield record
 
 
-def _one(
-    decode: Callable[[bytes], Any], convert: Callable[[Any, int], Record], raw: bytes, time: int
-) -> Iterator[Record]:
-    yield convert(decode(raw), time)
+def _links(message: Any, edge: Edge) -> list[Any]:
+    """The transforms of a message that are the given link."""
+    return [
+        stamped
+        for stamped in message.transforms
+        if (frame_name(stamped.header.frame_id), frame_name(stamped.child_frame_id))
+        == (edge.parent, edge.child)
+    ]
 
 
-def _guarded(decode: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
-    """A decoder under which every failure is an unusable message."""
+def _one(decode: Callable[[bytes], Any], convert: Convert, raw: bytes, time: int) -> Iterator[Record]:
+    yield _convert(decode, convert, raw, time)
 
-    def guarded(raw: bytes) -> Any:
-        try:
-            return decode(raw)
-        except Exception as error:
-            raise UnusableMessageError(messages.UNREADABLE) from error
 
-    return guarded
+def _convert(decode: Callable[[bytes], Any], convert: Convert, raw: bytes, time: int) -> Any:
+    """A decoded and converted message; every failure makes it an unusable one."""
+    try:
+        return convert(decode(raw), time)
+    except UnusableMessageError:
+        raise
+    except Exception as error:
+        raise UnusableMessageError(messages.UNREADABLE) from error
 
 
 def _info(bags: Sequence[Bag], found: Survey, options: SourceOptions) -> RecordingInfo:

@@ -13,6 +13,7 @@ import numpy as np
 from glassslam.errors import UsageError
 from glassslam.records import FloatArray
 from glassslam.sources.bag import MULTI_ECHO, Bag, Topic, merge_topics
+from glassslam.sources.failures import reading
 from glassslam.sources.frames import edge_name, guess_base, odometry_edge, read_tree
 from glassslam.sources.messages import Mount
 from glassslam.sources.multiecho import EchoScan, parse_cdr, parse_ros1
@@ -99,7 +100,8 @@ def survey(bags: Sequence[Bag], options: SourceOptions) -> Survey:
     NoScansError, UsageError, RecordingError
         As in `open_recording`.
     """
-    with ExitStack() as stack:
+    piece = bags[0].piece
+    with reading(piece.path, piece.format), ExitStack() as stack:
         for bag in bags:
             stack.enter_context(bag.session())
         return _Surveyor(bags, options).run()

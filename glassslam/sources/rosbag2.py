@@ -15,8 +15,10 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from glassslam.errors import RecordingError
 from glassslam.sources.bag import Decoder, Raw, Topic, merge_topics, typestore_for
-from glassslam.sources.failures import reading
+from glassslam.sources.failures import DAMAGED_HINT, REPAIR_TOOLS, reading
 from glassslam.sources.formats import Piece
+
+_SQLITE_HEADER = 100
 
 
 class _Storage(Protocol):
@@ -86,11 +88,28 @@ class Ros2Bag:
 def _storage(piece: Piece) -> _Storage:
     with reading(piece.path, piece.format):
         if piece.path.is_dir():
+            for file in piece.path.glob("*.db3"):
+                _check_size(file)
             return Reader(piece.path).storage
         if piece.format == "rosbag2-mcap":
             return McapReader(piece.path)
+        _check_size(piece.path)
         # The path becomes part of a URI, in which '?', '#' and '%' have a meaning.
         return Sqlite3Reader(Path(quote(str(piece.path))))
+
+
+def _check_size(path: Path) -> None:
+    """SQLite reads a file that is cut off as long as it does not touch the missing pages."""
+    with path.open("rb") as file:
+        header = file.read(_SQLITE_HEADER)
+    page_size, pages = int.from_bytes(header[16:18], "big"), int.from_bytes(header[28:32], "big")
+    # The largest page size does not fit into its two bytes and is written as 1.
+    missing = pages * (page_size if page_size > 1 else 65536) - path.stat().st_size
+    if missing > 0:
+        raise RecordingError(
+            f"cannot read {path}: the last {missing} bytes are missing",
+            DAMAGED_HINT.format(tool=REPAIR_TOOLS["rosbag2-sqlite3"]),
+        )
 
 
 def _is_cdr(connection: Connection) -> bool:

@@ -1,0 +1,111 @@
+"""Prediction of the next pose from odometry, an inertial sensor or constant velocity (pose extrapolator)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from glassslam.geometry import between, compose
+from glassslam.records import FloatArray, Imu, Odometry
+from glassslam.slam.odometry_track import OdometryTrack, YawTrack
+
+_LONGEST_STEP = 0.6
+_SHORTEST_STEP = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Where a scan is expected.
+
+    Attributes
+    ----------
+    pose_in_local : ndarray of float64, shape (3,)
+        Expected pose of the base, m and rad.
+    distance, rotation : float
+        Motion since the last pose that odometry (or the velocity) claims, m and rad.
+    twist : ndarray of float64, shape (3,)
+        Velocity of the base in its own frame, m/s and rad/s.
+    alternative : ndarray of float64, shape (3,), or None
+        What constant velocity expects where that differs much from the odometry: odometry of real
+        robots freezes and jumps.
+    measured : bool
+        Whether odometry stands behind the prediction.
+    """
+
+    pose_in_local: FloatArray
+    distance: float
+    rotation: float
+    twist: FloatArray
+    alternative: FloatArray | None
+    measured: bool
+
+
+class PoseExtrapolator:
+    """Keeps what is needed to predict the pose of the next scan."""
+
+    def __init__(self) -> None:
+        self.odometry = OdometryTrack()
+        self.yaw = YawTrack()
+        self._stamp = math.nan
+        self._pose = np.zeros(3)
+        self._odometry_pose: FloatArray | None = None
+        self._heading: float | None = None
+        self._velocity: FloatArray | None = None
+
+    def add_odometry(self, odometry: Odometry) -> None:
+        """Take an odometry pose."""
+        self.odometry.add(odometry)
+
+    def add_imu(self, imu: Imu) -> None:
+        """Take a yaw rate."""
+        self.yaw.add(imu)
+
+    def add_pose(self, stamp: float, pose_in_local: FloatArray) -> None:
+        """Take the matched pose of a scan."""
+        step = stamp - self._stamp
+        if _SHORTEST_STEP < step < _LONGEST_STEP:
+            self._velocity = between(self._pose, pose_in_local) / step
+        else:
+            self._velocity = None
+        self._stamp, self._pose = stamp, pose_in_local
+        self._odometry_pose = self.odometry.pose_at(stamp)
+        self._heading = self.yaw.angle_at(stamp)
+
+    def predict(self, stamp: float) -> Prediction:
+        """Expected pose at the stamp of the next scan."""
+        step = stamp - self._stamp
+        coasting = self._coast(step)
+        moved = self._odometry_motion(stamp)
+        motion = moved if moved is not None else self._turn_by_imu(stamp, coasting)
+        alternative = None
+        if moved is not None and coasting is not None:
+            gap = moved - coasting
+            if math.hypot(gap[0], gap[1]) > 0.1 or abs(gap[2]) > 0.06:
+                alternative = compose(self._pose, coasting)
+        twist = motion / step if _SHORTEST_STEP < step < _LONGEST_STEP else np.zeros(3)
+        return Prediction(
+            compose(self._pose, motion),
+            math.hypot(motion[0], motion[1]),
+            abs(float(motion[2])),
+            twist,
+            alternative,
+            moved is not None,
+        )
+
+    def _odometry_motion(self, stamp: float) -> FloatArray | None:
+        now = self.odometry.pose_at(stamp)
+        if now is None or self._odometry_pose is None:
+            return None
+        return between(self._odometry_pose, now)
+
+    def _coast(self, step: float) -> FloatArray | None:
+        if self._velocity is None or not 0.0 < step < _LONGEST_STEP:
+            return None
+        return self._velocity * step
+
+    def _turn_by_imu(self, stamp: float, coasting: FloatArray | None) -> FloatArray:
+        motion = np.zeros(3) if coasting is None else coasting.copy()
+        now = self.yaw.angle_at(stamp)
+        if now is not None and self._heading is not None:
+            motion[2] = now - self._heading
+        return motion

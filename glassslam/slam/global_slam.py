@@ -1,0 +1,175 @@
+"""Global SLAM: the pose graph, loop closures found beside local SLAM, and their optimisation."""
+
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
+
+from glassslam.config import Config
+from glassslam.geometry import between, compose
+from glassslam.grid.submap import Submap
+from glassslam.posegraph import PoseGraph
+from glassslam.posegraph.consistency import prune_closures
+from glassslam.posegraph.storage import LOOP
+from glassslam.records import FloatArray
+from glassslam.slam.closure import Closure
+from glassslam.slam.loop_closing import LoopSearcher, select
+from glassslam.slam.node import Node
+from glassslam.slam.stopwatch import Stages
+
+_LOOK_AHEAD = 45
+
+
+class GlobalSlam:
+    """Poses of all nodes, held together by local SLAM and loop closures.
+
+    Every `optimize_every_n_nodes` nodes one round is made: the closures found since the last round
+    enter the graph, the graph is optimised, and the next searches start in a background thread.
+    What a round uses depends on the nodes alone, never on how fast the thread was.
+
+    Attributes
+    ----------
+    graph : PoseGraph
+        Vertex i is node i.
+    searches : int
+        Searches made.
+    rejected : Counter
+        Reason -> searches that gave no closure.
+    ambiguous : int
+        Closures accepted that say nothing along one direction.
+    """
+
+    def __init__(self, config: Config, stages: Stages) -> None:
+        self._config = config
+        self._stages = stages
+        self.graph = PoseGraph()
+        self.nodes: list[Node] = []
+        self.submaps: list[Submap] = []
+        self.searches = self.ambiguous = 0
+        self.rejected: Counter[str] = Counter()
+        self._travel: list[float] = []
+        self._searched = 0
+        self._searcher = LoopSearcher(config.loop_closure)
+        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="loop-closing")
+        self._pending: Future[list[Closure]] | None = None
+        noise = config.optimization
+        self._step_weight = np.diag(
+            1.0
+            / np.array(
+                [noise.odometry_translation_noise, noise.odometry_translation_noise, noise.odometry_rotation_noise]
+            )
+        )
+
+    def add_node(self, node: Node) -> None:
+        """Take a node, and make a round when it is due."""
+        if not self.nodes:
+            self.graph.add_pose(node.pose_in_local)
+            self._travel.append(0.0)
+        else:
+            last = self.nodes[-1]
+            step = between(last.pose_in_local, node.pose_in_local)
+            self.graph.add_pose(compose(self.graph.poses[-1], step))
+            self.graph.add_constraints(
+                [last.index], [node.index], step[None], self._step_weight, "odometry"
+            )
+            self._travel.append(self._travel[-1] + float(np.hypot(step[0], step[1])))
+        self.nodes.append(node)
+        if len(self.nodes) % self._config.optimization.optimize_every_n_nodes == 0:
+            self._round(len(self.nodes) - _LOOK_AHEAD)
+
+    def add_submap(self, submap: Submap) -> None:
+        """Take a finished submap."""
+        self.submaps.append(submap)
+
+    def finish(self) -> None:
+        """Make the last searches, optimise, and take out the closures that do not fit."""
+        self._round(len(self.nodes))
+        self._collect()
+        limits = self._config.optimization
+        with self._stages.measure("optimisation"):
+            prune_closures(
+                self.graph,
+                limits.max_closure_residual,
+                max_iterations=limits.max_num_iterations,
+                solver=limits.solver,
+                huber_scale=limits.huber_scale,
+            )
+        self._pool.shutdown()
+
+    def abandon(self) -> None:
+        """Stop the background thread without finishing."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    @property
+    def poses(self) -> FloatArray:
+        """Poses of all nodes in the map frame, shape (n, 3)."""
+        return self.graph.poses
+
+    def residuals(self) -> dict[str, float]:
+        """Root mean square residuals of the closures in use, m and rad."""
+        edges = self.graph.edges
+        used = np.flatnonzero((edges.kinds == LOOP) & edges.enabled)
+        if used.size == 0:
+            return {}
+        ends = edges.ends[used]
+        poses = self.graph.poses
+        gap = between(edges.measured[used], between(poses[ends[:, 0]], poses[ends[:, 1]]))
+        return {
+            "loop_translation_rms": float(np.sqrt(np.mean(gap[:, 0] ** 2 + gap[:, 1] ** 2))),
+            "loop_rotation_rms": float(np.sqrt(np.mean(gap[:, 2] ** 2))),
+        }
+
+    def closures(self) -> tuple[int, int]:
+        """Numbers of closures in use and of closures taken out as inconsistent."""
+        loops = self.graph.edges.enabled[self.graph.edges.kinds == LOOP]
+        return int(loops.sum()), int((~loops).sum())
+
+    def _round(self, last: int) -> None:
+        """Collect, optimise, and start the searches for the nodes not searched yet before `last`."""
+        self._collect()
+        if not self._config.loop_closure.enabled or last <= self._searched:
+            return
+        with self._stages.measure("loop closing"):
+            candidates = select(
+                self.graph, self.nodes, self.submaps, self._searched, last, self._config.loop_closure
+            )
+        self._searched = last
+        if candidates:
+            self.searches += len(candidates)
+            self._pending = self._pool.submit(
+                self._search, candidates, list(self.nodes), np.array(self._travel), list(self.submaps)
+            )
+
+    def _search(
+        self, candidates: Sequence, nodes: list[Node], travel: FloatArray, submaps: list[Submap]
+    ) -> list[Closure]:
+        with self._stages.measure("loop closing"):
+            return self._searcher.search(candidates, nodes, travel, submaps)
+
+    def _collect(self) -> None:
+        """Enter what the last searches found, in their order, and optimise."""
+        if self._pending is None:
+            return
+        closures, self._pending = self._pending.result(), None
+        self.rejected.update(closure.rejected for closure in closures if closure.rejected)
+        found = [closure for closure in closures if not closure.rejected]
+        if not found:
+            return
+        self.ambiguous += sum(closure.ambiguous for closure in found)
+        roots = [np.linalg.cholesky(np.linalg.inv(closure.covariance)).T for closure in found]
+        limits = self._config.optimization
+        with self._stages.measure("optimisation"):
+            self.graph.add_constraints(
+                [closure.candidate.anchor for closure in found],
+                [closure.candidate.node for closure in found],
+                np.array([closure.anchor_from_node for closure in found]),
+                np.array(roots),
+                "loop",
+            )
+            self.graph.optimize(
+                limits.max_num_iterations,
+                solver=limits.solver,
+                huber_scale=limits.huber_scale,
+                tolerance=1e-5,
+            )

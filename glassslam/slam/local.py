@@ -1,0 +1,185 @@
+"""Local SLAM: every scan is matched against the active submap, some become nodes."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from glassslam.config import Config
+from glassslam.geometry import transform_points
+from glassslam.grid.probability_grid import OddsModel, ProbabilityGrid
+from glassslam.grid.submap import ActiveSubmaps, Submap
+from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
+from glassslam.matching.correlative import search_around
+from glassslam.matching.gradient import MatchResult, match_scan
+from glassslam.records import FloatArray
+from glassslam.slam.extrapolator import Prediction
+from glassslam.slam.motion_filter import MotionFilter
+from glassslam.slam.node import Node
+from glassslam.slam.range_data import RangeData, thin, thin_adaptively
+
+_CALM_DISTANCE = 0.1
+_CALM_ROTATION = 0.05
+_WEAK_WEIGHT = 0.03
+_COASTING_SHARE = 0.3
+_LOST_RATIO = 1.15
+_LOST_WINDOW, _LOST_TURN = 1.5, 2.0
+_LOST_SCORE = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class LocalResult:
+    """What local SLAM made of a scan.
+
+    Attributes
+    ----------
+    pose_in_local : ndarray of float64, shape (3,)
+        Pose of the base, m and rad.
+    node : Node or None
+        The node, when the scan became one.
+    submaps : list of Submap
+        The submaps the node went into.
+    finished : Submap or None
+        The submap it completed.
+    """
+
+    pose_in_local: FloatArray
+    node: Node | None
+    submaps: list[Submap]
+    finished: Submap | None
+
+
+class LocalSlam:
+    """Tracks the robot against the submap being built.
+
+    Attributes
+    ----------
+    searches, searches_taken, coasted, unmatched : int
+        Correlative searches made and believed, odometry jumps overruled by constant velocity, and
+        scans with too few returns to match.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        odds = OddsModel(config.submap.hit_probability, config.submap.miss_probability)
+        self._submaps = ActiveSubmaps(config.submap.resolution, odds, config.submap.num_range_data)
+        self._motion_filter = MotionFilter(config.motion_filter)
+        self._usual_residual = 0.5
+        self._scans = 0
+        self._nodes = 0
+        self.searches = self.searches_taken = self.coasted = self.unmatched = 0
+        self.relocalisations = self.relocalised = 0
+
+    def add(self, data: RangeData, prediction: Prediction) -> LocalResult:
+        """Match one scan and enter it when the motion filter admits it."""
+        pose, residual = self._match(data, prediction)
+        scan = self._scans
+        self._scans += 1
+        if not self._motion_filter.admits(data.stamp, pose):
+            return LocalResult(pose, None, [], None)
+        node = Node(
+            self._nodes, scan, data.stamp, pose, data.sensor, data.returns.astype(np.float32),
+            data.free_ends.astype(np.float32), residual,
+        )  # fmt: skip
+        self._nodes += 1
+        entered, finished = self._submaps.insert(
+            node.index,
+            pose,
+            transform_points(pose, data.sensor[None])[0],
+            transform_points(pose, data.returns),
+            transform_points(pose, data.free_ends),
+        )
+        return LocalResult(pose, node, entered, finished)
+
+    def finish(self) -> list[Submap]:
+        """Complete the active submaps."""
+        return self._submaps.finish()
+
+    def _match(self, data: RangeData, prediction: Prediction) -> tuple[FloatArray, float]:
+        submap = self._submaps.matching
+        if submap is None:
+            return prediction.pose_in_local, self._usual_residual
+        filters, local = self._config.filter, self._config.local
+        points = thin_adaptively(data.returns, filters.adaptive_max_length, filters.adaptive_min_num_points)
+        if len(points) < local.min_num_points:
+            self.unmatched += 1
+            return prediction.pose_in_local, self._usual_residual
+        best = self._match_near(submap.grid, points, prediction, prediction.pose_in_local)
+        if prediction.alternative is not None:
+            coasting = self._match_near(submap.grid, points, prediction, prediction.alternative)
+            if coasting.residual < best.residual - 0.02:
+                best = coasting
+                self.coasted += 1
+        if self._is_doubtful(best, prediction):
+            best = self._search(submap.grid, points, best)
+        if best.residual > _LOST_RATIO * self._usual_residual + 0.02:
+            best = self._relocalise(submap.grid, points, best)
+        self._usual_residual = 0.9 * self._usual_residual + 0.1 * best.residual
+        return best.pose, best.residual
+
+    def _match_near(
+        self, grid: ProbabilityGrid, points: FloatArray, prediction: Prediction, start: FloatArray
+    ) -> MatchResult:
+        """Gradient match whose prior weighs less the more the robot moved (odometry errors grow with motion)."""
+        local = self._config.local
+        trust = 1.0 if prediction.measured else _COASTING_SHARE
+        return match_scan(
+            grid,
+            points,
+            start,
+            occupied_space_weight=local.occupied_space_weight,
+            translation_weight=trust * local.translation_weight / math.sqrt(prediction.distance + _CALM_DISTANCE),
+            rotation_weight=trust * local.rotation_weight / math.sqrt(prediction.rotation + _CALM_ROTATION),
+            max_iterations=local.max_num_iterations,
+        )
+
+    def _is_doubtful(self, match: MatchResult, prediction: Prediction) -> bool:
+        mode = self._config.local.correlative_search
+        if mode != "when_doubtful":
+            return mode == "always"
+        return match.residual > 1.1 * self._usual_residual + 0.01 or prediction.rotation > 0.15
+
+    def _search(self, grid: ProbabilityGrid, points: FloatArray, found: MatchResult) -> MatchResult:
+        """Real-time correlative search around a doubtful match; taken only when clearly better."""
+        local = self._config.local
+        self.searches += 1
+        start = search_around(
+            grid, points, found.pose, local.search_linear_window, math.radians(local.search_angular_window_deg)
+        )
+        refined = self._refine(grid, points, start)
+        if refined.residual < found.residual - 0.05:
+            self.searches_taken += 1
+            return refined
+        return found
+
+    def _relocalise(self, grid: ProbabilityGrid, points: FloatArray, found: MatchResult) -> MatchResult:
+        """Branch and bound in the submap after tracking was lost, as after a gap in the recording."""
+        self.relocalisations += 1
+        matcher = BranchAndBoundMatcher(grid, _LOST_WINDOW)
+        coarse = points[:: max(1, len(points) // 150)]
+        match = matcher.match(coarse, found.pose, _LOST_WINDOW, _LOST_TURN, _LOST_SCORE)
+        if match is None:
+            return found
+        refined = self._refine(grid, points, match.pose)
+        if refined.residual < found.residual - 0.05:
+            self.relocalised += 1
+            return refined
+        return found
+
+    def _refine(self, grid: ProbabilityGrid, points: FloatArray, start: FloatArray) -> MatchResult:
+        """Gradient match from the result of a search, which odometry has no say in."""
+        local = self._config.local
+        return match_scan(
+            grid,
+            points,
+            start,
+            occupied_space_weight=local.occupied_space_weight,
+            translation_weight=_WEAK_WEIGHT,
+            rotation_weight=_WEAK_WEIGHT,
+            max_iterations=local.max_num_iterations,
+        )
+
+
+def prepared(data: RangeData, voxel_edge: float) -> RangeData:
+    """The scan with its returns thinned by the first voxel filter."""
+    return RangeData(data.stamp, data.sensor, thin(data.returns, voxel_edge), data.free_ends)

@@ -1,0 +1,127 @@
+"""Which searches to make for loop closures, and making them beside local SLAM."""
+
+import math
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+
+from glassslam.config import LoopClosureConfig
+from glassslam.geometry import between
+from glassslam.grid.submap import Submap
+from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
+from glassslam.posegraph import PoseGraph
+from glassslam.records import FloatArray
+from glassslam.slam.closure import Candidate, Closure, close, needs_search
+from glassslam.slam.neighbourhood import neighbourhood, neighbours
+from glassslam.slam.node import Node
+
+_NEAR = 4.0
+_FARTHEST_CANDIDATE = 25.0
+_LINEAR_MARGIN, _ANGULAR_MARGIN = 0.1, 0.03
+_CACHED_BYTES = 64_000_000
+CHI_SQUARE_LIMIT = 20.0
+
+
+def select(
+    graph: PoseGraph, nodes: Sequence[Node], submaps: Sequence[Submap], first: int, last: int, config: LoopClosureConfig
+) -> list[Candidate]:
+    """Searches for the nodes `first` .. `last` - 1 in finished submaps.
+
+    A search is made where the graph, within three standard deviations and a few metres, allows that
+    the node sees the submap; its window follows from the covariance of the node in the submap.
+    """
+    poses = graph.poses
+    pairs: list[tuple[int, int, int, float]] = []
+    for submap in submaps:
+        queries = np.arange(max(first, submap.nodes[-1] + config.min_node_gap + 1), last)
+        pairs += _nearest_pairs(poses, queries, submap, config)
+    if not pairs:
+        return []
+    covariances = graph.relative_covariances([(anchor, node) for node, anchor, _, _ in pairs])
+    chosen = []
+    for (node, anchor, submap_index, distance), covariance in zip(pairs, covariances, strict=True):
+        spread = 3.0 * math.sqrt(max(covariance[0, 0], covariance[1, 1]))
+        if distance > _NEAR + spread:
+            continue
+        turn = 3.0 * math.sqrt(covariance[2, 2])
+        chosen.append(
+            Candidate(
+                node,
+                anchor,
+                submap_index,
+                nodes[anchor].pose_in_local,
+                between(poses[anchor], poses[node]),
+                min(config.max_linear_window, spread + _LINEAR_MARGIN),
+                min(math.radians(config.max_angular_window_deg), turn + _ANGULAR_MARGIN),
+                covariance,
+            )
+        )
+    return chosen
+
+
+def _nearest_pairs(
+    poses: FloatArray, queries: np.ndarray, submap: Submap, config: LoopClosureConfig
+) -> list[tuple[int, int, int, float]]:
+    """Nodes near a submap, nearest first, not closer together than the sampling stride."""
+    members = np.asarray(submap.nodes)
+    if queries.size == 0 or not _may_be_near(poses[queries, :2], poses[members, :2]):
+        return []
+    gaps = np.hypot(
+        poses[queries, 0][:, None] - poses[members, 0][None], poses[queries, 1][:, None] - poses[members, 1][None]
+    )
+    nearest = gaps.argmin(axis=1)
+    distances = gaps[np.arange(len(queries)), nearest]
+    taken: list[tuple[int, int, int, float]] = []
+    for k in np.argsort(distances, kind="stable"):
+        node = int(queries[k])
+        if distances[k] >= _FARTHEST_CANDIDATE or len(taken) == config.max_searches_per_submap:
+            break
+        if all(abs(node - other[0]) >= config.sampling_stride for other in taken):
+            taken.append((node, int(members[nearest[k]]), submap.index, float(distances[k])))
+    return taken
+
+
+def _may_be_near(a: FloatArray, b: FloatArray) -> bool:
+    """Whether the bounding boxes of two point sets come within the farthest candidate distance."""
+    gap = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
+    return bool((gap < _FARTHEST_CANDIDATE).all())
+
+
+class LoopSearcher:
+    """Makes searches one after another; runs in one background thread."""
+
+    def __init__(self, config: LoopClosureConfig) -> None:
+        self._config = config
+        self._matchers: OrderedDict[int, BranchAndBoundMatcher] = OrderedDict()
+
+    def search(
+        self,
+        candidates: Sequence[Candidate],
+        nodes: list[Node],
+        travel: FloatArray,
+        submaps: Sequence[Submap],
+    ) -> list[Closure]:
+        """Results of all candidates, in their order."""
+        return [self._close(candidate, nodes, travel, submaps) for candidate in candidates]
+
+    def _close(
+        self, candidate: Candidate, nodes: list[Node], travel: FloatArray, submaps: Sequence[Submap]
+    ) -> Closure:
+        chosen = neighbours(travel, candidate.node, self._config.neighbourhood)
+        scene = neighbourhood(nodes, chosen, candidate.node)
+        submap = submaps[candidate.submap]
+        matcher = None
+        if needs_search(candidate.linear_window, candidate.angular_window):
+            matcher = self._matcher(submap, candidate.linear_window)
+        return close(candidate, scene, submap.grid, matcher, self._config, CHI_SQUARE_LIMIT)
+
+    def _matcher(self, submap: Submap, window: float) -> BranchAndBoundMatcher:
+        """Max grids of a submap, built when first needed and dropped when long unused."""
+        matcher = self._matchers.pop(submap.index, None)
+        if matcher is None or matcher.max_linear_window < window:
+            matcher = BranchAndBoundMatcher(submap.grid, min(2.0 * window, self._config.max_linear_window))
+        self._matchers[submap.index] = matcher
+        while sum(m.nbytes for m in self._matchers.values()) > _CACHED_BYTES and len(self._matchers) > 1:
+            self._matchers.popitem(last=False)
+        return matcher

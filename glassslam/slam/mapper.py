@@ -1,0 +1,180 @@
+"""The mapper: records in, a map out."""
+
+import math
+from collections import Counter, deque
+
+import numpy as np
+
+from glassslam.config import Config
+from glassslam.errors import NoScansError
+from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
+from glassslam.slam.extrapolator import PoseExtrapolator
+from glassslam.slam.global_slam import GlobalSlam
+from glassslam.slam.local import LocalSlam, prepared
+from glassslam.slam.range_data import prepare
+from glassslam.slam.render import render
+from glassslam.slam.result import MapResult, RunStatistics
+from glassslam.slam.stopwatch import Stages
+from glassslam.slam.trajectory import corrected_poses
+
+_LONGEST_WAIT = 1.0
+_MOST_WAITING = 200
+
+
+class Mapper:
+    """Builds a map from records, one at a time.
+
+    Parameters
+    ----------
+    config : Config
+        All parameters.
+    base_from_laser : array_like, shape (3,)
+        Pose (x, y, yaw) of the laser in the frame of the base, m and rad.
+
+    Examples
+    --------
+    >>> import glassslam as gs
+    >>> import numpy as np
+    >>> mapper = gs.Mapper(gs.Config())
+    >>> for k in range(3):
+    ...     ranges = np.full(180, 2.0, dtype=np.float32)
+    ...     mapper.add(gs.LaserScan(0.1 * k, ranges, -np.pi / 2, np.pi / 180, 0.1, 30.0))
+    >>> mapper.finish().trajectory.poses.shape
+    (3, 3)
+    """
+
+    def __init__(self, config: Config | None = None, base_from_laser: object = (0.0, 0.0, 0.0)) -> None:
+        self._config = config or Config()
+        self._base_from_laser = np.asarray(base_from_laser, dtype=np.float64)
+        self._stages = Stages()
+        self._extrapolator = PoseExtrapolator()
+        self._local = LocalSlam(self._config)
+        self._global = GlobalSlam(self._config, self._stages)
+        self._waiting: deque[LaserScan] = deque()
+        self._stamps: list[float] = []
+        self._poses: list[FloatArray] = []
+        self._read = 0
+        self._dropped: Counter[str] = Counter()
+
+    def add(self, record: Record) -> None:
+        """Take one record, in the order of the recording.
+
+        A scan waits until odometry reaches its stamp, at most a second of recorded time.
+        """
+        if isinstance(record, LaserScan):
+            self._add_scan(record)
+        elif isinstance(record, Odometry):
+            self._extrapolator.add_odometry(record)
+        elif isinstance(record, Imu):
+            self._extrapolator.add_imu(record)
+        while self._waiting and self._is_ready(self._waiting[0]):
+            self._process(self._waiting.popleft())
+
+    def finish(self, info: RecordingInfo | None = None) -> MapResult:
+        """Process what waits, close the last loops, optimise and render.
+
+        Raises
+        ------
+        NoScansError
+            Not one usable scan came in.
+        """
+        while self._waiting:
+            self._process(self._waiting.popleft())
+        for submap in self._local.finish():
+            self._global.add_submap(submap)
+        if not self._global.nodes:
+            self._global.abandon()
+            raise NoScansError(
+                "no usable laser scan in the recording",
+                f"{self._read} scans read; dropped: {dict(self._dropped) or 'none'}",
+            )
+        self._global.finish()
+        with self._stages.measure("rendering"):
+            grid = render(self._global.nodes, self._global.poses, self._config.map)
+        return self._result(grid, info)
+
+    def close(self) -> None:
+        """Give up: stop background work without a result."""
+        self._global.abandon()
+
+    def _add_scan(self, scan: LaserScan) -> None:
+        self._read += 1
+        reason = _unusable(scan)
+        if reason:
+            self._dropped[reason] += 1
+        else:
+            self._waiting.append(scan)
+
+    def _is_ready(self, scan: LaserScan) -> bool:
+        """Whether odometry has reached the scan, or there is none to wait for."""
+        track = self._extrapolator.odometry
+        if len(track) == 0:
+            return len(self._waiting) > _MOST_WAITING or self._waited(scan)
+        return track.latest >= scan.stamp or self._waited(scan)
+
+    def _waited(self, scan: LaserScan) -> bool:
+        return abs(self._waiting[-1].stamp - scan.stamp) > _LONGEST_WAIT or len(self._waiting) > _MOST_WAITING
+
+    def _process(self, scan: LaserScan) -> None:
+        with self._stages.measure("local SLAM"):
+            prediction = self._extrapolator.predict(scan.stamp)
+            data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor)
+            result = self._local.add(prepared(data, self._config.filter.voxel_filter_size), prediction)
+            self._extrapolator.add_pose(scan.stamp, result.pose_in_local)
+            self._stamps.append(scan.stamp)
+            self._poses.append(result.pose_in_local)
+        if result.finished is not None:
+            self._global.add_submap(result.finished)
+        if result.node is not None:
+            self._global.add_node(result.node)
+
+    def _result(self, grid: object, info: RecordingInfo | None) -> MapResult:
+        nodes = self._global.nodes
+        poses = np.array(self._global.poses)
+        every = corrected_poses(
+            np.array(self._poses),
+            np.array([node.scan for node in nodes]),
+            np.array([node.pose_in_local for node in nodes]),
+            poses,
+        )
+        return MapResult(
+            map=grid,
+            trajectory=Trajectory(np.array(self._stamps), every),
+            node_stamps=np.array([node.stamp for node in nodes]),
+            node_poses=poses,
+            submap_nodes=tuple(submap.nodes[0] for submap in self._global.submaps),
+            constraints=self._global.graph.constraints,
+            config=self._config,
+            statistics=self._statistics(),
+            info=info,
+        )
+
+    def _statistics(self) -> RunStatistics:
+        used, taken_out = self._global.closures()
+        rejected = dict(sorted(self._global.rejected.items()))
+        if taken_out:
+            rejected["taken out after optimisation"] = taken_out
+        return RunStatistics(
+            scans_read=self._read,
+            scans_used=len(self._stamps),
+            scans_dropped=dict(sorted(self._dropped.items())),
+            recording_seconds=float(max(self._stamps) - min(self._stamps)),
+            stages=dict(sorted(self._stages.times.items())),
+            nodes=len(self._global.nodes),
+            submaps=len(self._global.submaps),
+            closures_tried=self._global.searches,
+            closures_accepted=used,
+            closures_rejected=rejected,
+            residuals=self._global.residuals(),
+        )
+
+
+def _unusable(scan: LaserScan) -> str:
+    """Why a scan cannot be used; empty when it can."""
+    if not math.isfinite(scan.stamp):
+        return "stamp not finite"
+    if len(scan.ranges) == 0:
+        return "no beams"
+    if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)) or scan.angle_increment == 0:
+        return "angles not usable"
+    return ""

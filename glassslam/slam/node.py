@@ -1,0 +1,37 @@
+"""Nodes: the scans that are kept (trajectory nodes of Cartographer)."""
+
+from dataclasses import dataclass
+
+from glassslam.records import Float32Array, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A scan that went into the map.
+
+    Attributes
+    ----------
+    index : int
+        Number of the node.
+    scan : int
+        Number of the scan in the trajectory.
+    stamp : float
+        Time of the scan, s.
+    pose_in_local : ndarray of float64, shape (3,)
+        Pose of the base in the local frame, m and rad.
+    sensor : ndarray of float64, shape (2,)
+        Position of the laser in the frame of the base, m.
+    returns, free_ends : ndarray of float32, shape (n, 2), (m, 2)
+        Returns, and ends of the free space of silent beams, in the frame of the base, m.
+    residual : float
+        Root mean square of 1 - P(occupied) of the local match.
+    """
+
+    index: int
+    scan: int
+    stamp: float
+    pose_in_local: FloatArray
+    sensor: FloatArray
+    returns: Float32Array
+    free_ends: Float32Array
+    residual: float

@@ -1,0 +1,100 @@
+"""Where the odometry says the robot was: interpolation to the time of a scan."""
+
+import math
+from bisect import bisect_right
+from collections import deque
+
+import numpy as np
+
+from glassslam.geometry import between, compose, interpolate
+from glassslam.records import FloatArray, Imu, Odometry
+
+_KEPT = 512
+_LONGEST_EXTRAPOLATION = 0.5
+
+
+class OdometryTrack:
+    """The last few odometry poses, in the order they arrived.
+
+    Stamps may step back in old logs; an older stretch never overrules a newer one.
+    """
+
+    def __init__(self) -> None:
+        self._stamps: deque[float] = deque(maxlen=_KEPT)
+        self._poses: deque[FloatArray] = deque(maxlen=_KEPT)
+        self.dropped = 0
+
+    def __len__(self) -> int:
+        return len(self._stamps)
+
+    @property
+    def latest(self) -> float:
+        """Stamp of the last pose that arrived, s; -inf before the first."""
+        return self._stamps[-1] if self._stamps else -math.inf
+
+    def add(self, odometry: Odometry) -> None:
+        """Take a pose; one that is not finite is counted in `dropped` and left out."""
+        if not (math.isfinite(odometry.stamp) and all(map(math.isfinite, odometry.pose))):
+            self.dropped += 1
+            return
+        self._stamps.append(odometry.stamp)
+        self._poses.append(np.array(odometry.pose))
+
+    def pose_at(self, stamp: float) -> FloatArray | None:
+        """Pose of the base in the odometry frame, shape (3,), or None where the track does not reach.
+
+        Interpolated between the newest two neighbours that enclose the stamp; up to half a second
+        beyond the last pose it is extrapolated with the last velocity.
+        """
+        if not self._stamps:
+            return None
+        if stamp >= self.latest:
+            return self._extrapolate(stamp)
+        for k in range(len(self._stamps) - 2, -1, -1):
+            before, after = self._stamps[k], self._stamps[k + 1]
+            if before <= stamp < after:
+                return interpolate(self._poses[k], self._poses[k + 1], (stamp - before) / (after - before))
+        return None
+
+    def _extrapolate(self, stamp: float) -> FloatArray | None:
+        ahead = stamp - self.latest
+        if ahead == 0.0 or len(self._stamps) == 1:
+            return self._poses[-1] if ahead <= _LONGEST_EXTRAPOLATION else None
+        step = self.latest - self._stamps[-2]
+        if ahead > _LONGEST_EXTRAPOLATION:
+            return None
+        if not 0.0 < step <= _LONGEST_EXTRAPOLATION:
+            return self._poses[-1]
+        motion = between(self._poses[-2], self._poses[-1])
+        return compose(self._poses[-1], motion * (ahead / step))
+
+
+class YawTrack:
+    """Heading integrated from the yaw rates of an inertial sensor."""
+
+    def __init__(self) -> None:
+        self._stamps: list[float] = []
+        self._angles: list[float] = []
+        self._rates: list[float] = []
+        self.dropped = 0
+
+    def add(self, imu: Imu) -> None:
+        """Take a rate; one that is not finite or not newer than the last is counted in `dropped`."""
+        last = self._stamps[-1] if self._stamps else -math.inf
+        if not (math.isfinite(imu.stamp) and math.isfinite(imu.yaw_rate) and imu.stamp > last):
+            self.dropped += 1
+            return
+        angle = self._angles[-1] + imu.yaw_rate * (imu.stamp - last) if self._stamps else 0.0
+        self._stamps.append(imu.stamp)
+        self._angles.append(angle)
+        self._rates.append(imu.yaw_rate)
+        if len(self._stamps) > 4 * _KEPT:
+            for values in (self._stamps, self._angles, self._rates):
+                del values[: 2 * _KEPT]
+
+    def angle_at(self, stamp: float) -> float | None:
+        """Integrated heading, rad, or None farther than half a second from the known rates."""
+        k = bisect_right(self._stamps, stamp) - 1
+        if k < 0 or stamp - self._stamps[k] > _LONGEST_EXTRAPOLATION:
+            return None
+        return self._angles[k] + self._rates[k] * (stamp - self._stamps[k])
