@@ -86,6 +86,18 @@ def clear_ray(
 
 
 @kernel
+def extend_box(points: FloatArray, box: FloatArray) -> bool:
+    """Widen the box (x low, y low, x high, y high) to hold the points; False when one is not finite."""
+    finite = True
+    for k in range(points.shape[0]):
+        x, y = points[k, 0], points[k, 1]
+        finite = finite and math.isfinite(x) and math.isfinite(y)
+        box[0], box[1] = min(box[0], x), min(box[1], y)
+        box[2], box[3] = max(box[2], x), max(box[3], y)
+    return finite
+
+
+@kernel
 def insert_scan(
     cells: Cells,
     marks: Cells,

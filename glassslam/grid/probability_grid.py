@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.errors import GridError
-from glassslam.grid.kernels import Cells, insert_scan
+from glassslam.grid.kernels import Cells, extend_box, insert_scan
 from glassslam.grid.odds import OddsModel
 from glassslam.records import Float32Array, FloatArray
 
@@ -96,7 +96,7 @@ class ProbabilityGrid:
             A coordinate that is not finite, or an array of another shape.
         """
         sensor, hits, free_ends = point_array([sensor])[0], point_array(hits), point_array(free_ends)
-        self._contain(np.concatenate((sensor[None], hits, free_ends)))
+        self._contain(sensor, hits, free_ends)
         if self._mark == _LAST_MARK:
             self._marks[:] = 0
             self._mark = 0
@@ -137,17 +137,18 @@ class ProbabilityGrid:
         out[inside] = np.where(values == 0, np.nan, self.table[values])
         return out
 
-    def _contain(self, points: FloatArray) -> None:
+    def _contain(self, sensor: FloatArray, hits: FloatArray, free_ends: FloatArray) -> None:
         """Grow until all points lie inside with a margin for the bicubic neighbourhood."""
-        low, high = points.min(axis=0), points.max(axis=0)
-        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        box = np.concatenate((sensor, sensor))
+        finite = extend_box(hits, box) & extend_box(free_ends, box) & bool(np.isfinite(sensor).all())
+        if not finite:
             raise GridError("scan with a coordinate that is not finite", "leave out invalid beams")
         if self.cells.size == 0:
-            self.origin = np.floor(points[0] / self.resolution) * self.resolution
+            self.origin = np.floor(sensor / self.resolution) * self.resolution
         if self._marks.shape != self.cells.shape:  # finished before
             self._marks, self._mark = np.zeros_like(self.cells), 0
-        first = np.floor((low - self.origin) / self.resolution).astype(np.int64)
-        last = np.floor((high - self.origin) / self.resolution).astype(np.int64)
+        first = np.floor((box[:2] - self.origin) / self.resolution).astype(np.int64)
+        last = np.floor((box[2:] - self.origin) / self.resolution).astype(np.int64)
         size = np.array(self.cells.shape[::-1])
         before = np.where(first < 2, _MARGIN_CELLS - np.minimum(first, 0), 0)
         after = np.where(last >= size - 2, np.maximum(_MARGIN_CELLS + last - size, 0), 0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.grid.probability_grid import ProbabilityGrid
+from glassslam.grid.probability_grid import ProbabilityGrid, point_array
 from glassslam.matching.search_kernels import branch_and_bound, discretise, max_over_windows, quantise
 from glassslam.records import Float32Array, FloatArray
 
@@ -115,6 +115,7 @@ class BranchAndBoundMatcher:
         SearchMatch or None
             None when no pose in the window scores `min_score`.
         """
+        points = point_array(points)
         if len(points) == 0:
             return None
         farthest = float(np.sqrt((points**2).sum(axis=1).max()))
@@ -131,7 +132,8 @@ class BranchAndBoundMatcher:
         )  # fmt: skip
         start = min(len(self._levels) - 1, max(0, int(math.log2(max(1, window)))))
         found = np.zeros(3, dtype=np.int64)
-        threshold = int(min_score * 255.0 * len(points))
+        # scores are whole numbers; those of `min_score` itself count
+        threshold = math.ceil(min_score * 255.0 * len(points) - 1e-6) - 1
         best = branch_and_bound(self._levels, self._stride, index, lengths, window, start, threshold, found)
         if best <= threshold:
             return None

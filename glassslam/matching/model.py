@@ -19,27 +19,48 @@ def spline_weights(t: ca.SX) -> ca.SX:
     return ca.vertcat(sixth * s * s * s, left, right, sixth * t * t * t)
 
 
-def occupied_space_function() -> ca.Function:
-    """Residual 1 - M_smooth(T h) of one point h and its gradient by the pose T (METHODS.md, section 0).
+def surface_derivatives(u: ca.SX, v: ca.SX, cells: ca.SX) -> ca.SX:
+    """d^(j+i) M / dv^j du^i in row j and column i, j + i <= 2, of the smooth grid at (u, v), shape (3, 3).
 
-    `c[4 j + i]` is the probability of the cell in column `column + i - 1` and row `row + j - 1`.
+    The surface is a product of a spline along each axis, so two short products give all derivatives.
     """
-    pose, point, origin = ca.SX.sym("pose", 3), ca.SX.sym("point", 2), ca.SX.sym("origin", 2)
-    inverse_resolution, column, row = ca.SX.sym("inverse_resolution"), ca.SX.sym("column"), ca.SX.sym("row")
-    cells = ca.SX.sym("c", 16)
-    cosine, sine = ca.cos(pose[2]), ca.sin(pose[2])
-    x = cosine * point[0] - sine * point[1] + pose[0]
-    y = sine * point[0] + cosine * point[1] + pose[1]
-    u = (x - origin[0]) * inverse_resolution - 0.5 - column
-    v = (y - origin[1]) * inverse_resolution - 0.5 - row
-    along_x = ca.reshape(cells, 4, 4).T @ spline_weights(u)
-    residual = 1.0 - ca.dot(along_x, spline_weights(v))
+
+    def with_derivatives(t: ca.SX) -> ca.SX:
+        weights = spline_weights(t)
+        slopes = ca.jacobian(weights, t)
+        return ca.horzcat(weights, slopes, ca.jacobian(slopes, t))
+
+    return with_derivatives(v).T @ (ca.reshape(cells, 4, 4).T @ with_derivatives(u))
+
+
+def occupied_space_function() -> ca.Function:
+    """Residual 1 - M_smooth(T h) of one point h and its derivatives by the pose T (METHODS.md, section 0).
+
+    `turned` is R h, the point turned by the heading of the pose; (u, v) is T h from the centre of
+    a cell, in cells; `c[4 j + i]` is the probability of the cell i - 1 columns and j - 1 rows
+    from that one. The derivatives are those by a small move of the pose: sines of the heading
+    are shared by all points of a scan and stay out of the kernel. `hessian` lists the upper
+    triangle of the second derivatives, row by row.
+    """
+    turned, cells, move = ca.SX.sym("turned", 2), ca.SX.sym("c", 16), ca.SX.sym("move", 3)
+    u, v, inverse_resolution = ca.SX.sym("u"), ca.SX.sym("v"), ca.SX.sym("inverse_resolution")
+    cosine, sine = ca.cos(move[2]), ca.sin(move[2])
+    du = inverse_resolution * (cosine * turned[0] - sine * turned[1] + move[0] - turned[0])
+    dv = inverse_resolution * (sine * turned[0] + cosine * turned[1] + move[1] - turned[1])
+    m = surface_derivatives(u, v, cells)
+    # the expansion to second order has the first and second derivatives of the surface itself
+    along_u, along_v = m[0, 1] * du + m[0, 2] * du * du / 2, m[1, 0] * dv + m[2, 0] * dv * dv / 2
+    residual = 1.0 - (m[0, 0] + along_u + along_v + m[1, 1] * du * dv)
+    gradient = ca.jacobian(residual, move)
+    hessian = ca.jacobian(gradient, move)
+    triangle = ca.vertcat(*(hessian[i, j] for i in range(3) for j in range(i, 3)))
+    at_rest = ca.substitute([residual, gradient, triangle], [move], [ca.DM.zeros(3)])
     return ca.Function(
         "occupied_space",
-        [pose, point, origin, inverse_resolution, column, row, cells],
-        [residual, ca.jacobian(residual, pose)],
-        ["pose", "point", "origin", "inverse_resolution", "column", "row", "c"],
-        ["residual", "gradient"],
+        [turned, u, v, inverse_resolution, cells],
+        at_rest,
+        ["turned", "u", "v", "inverse_resolution", "c"],
+        ["residual", "gradient", "hessian"],
     )
 
 

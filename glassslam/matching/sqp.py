@@ -4,6 +4,7 @@ The solver asks through callbacks for the cost, its gradient and the Gauss-Newto
 and write its own memory. Building one costs milliseconds, so every thread keeps those it used.
 """
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from threading import local
 from typing import Any
@@ -57,8 +58,8 @@ class SqpSolver:
         self._buffer, self._run = self._solver.buffer()
         # bounds that are not set read as zero
         for name, array in (("x0", self._start), ("lbx", self._low), ("ubx", self._high)):
-            self._buffer.set_arg(self._solver.index_in(name), memoryview(array))
-        self._buffer.set_res(self._solver.index_out("x"), memoryview(self._found))
+            self._buffer.set_arg(self._solver.index_in(name), array.data)
+        self._buffer.set_res(self._solver.index_out("x"), self._found.data)
 
     def solve(self, problem: MatchProblem) -> tuple[FloatArray, int]:
         """Pose of least cost and the number of evaluations."""
@@ -77,6 +78,7 @@ def _options(max_iterations: int, tolerance: float) -> dict[str, Any]:
         "print_iteration": False,
         "print_status": False,
         "calc_lam_p": False,
+        "calc_lam_x": False,
         "error_on_fail": False,
         "max_iter": max_iterations,
         "tol_du": tolerance,
@@ -92,7 +94,7 @@ class _Evaluation:
     """The objective at the pose the solver asked for last, shared by the callbacks."""
 
     def __init__(self) -> None:
-        self._at, self._values = np.full(3, np.nan), np.zeros(10)
+        self._at, self._values = np.full(3, np.nan), np.zeros(13)
         self.count = 0
 
     def begin(self, problem: MatchProblem) -> None:
@@ -101,7 +103,7 @@ class _Evaluation:
         self.count = 0
 
     def at(self, buffer: Any) -> FloatArray:
-        """Cost, gradient (3) and upper triangle of the Hessian (6) at the pose in a buffer."""
+        """Cost, gradient (3) and Gauss-Newton Hessian (9) at the pose in a buffer."""
         pose = np.frombuffer(buffer, dtype=np.float64)
         if not (pose == self._at).all():
             objective(*self._problem.arguments, pose, self._values)
@@ -143,7 +145,7 @@ class _Callback(ca.Callback):
             "grad_f_x": ca.Sparsity.dense(3, 1),
             "g": ca.Sparsity.dense(0, 1),
             "jac_g_x": ca.Sparsity.dense(0, 3),
-            "triu_hess_gamma_x_x": ca.Sparsity.upper(3),
+            "hess_gamma_x_x": ca.Sparsity.dense(3, 3),
         }
         return sparsity[self.outputs[index]]
 
@@ -155,6 +157,18 @@ class _Cost(_Callback):
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
         _write(results[0], self.evaluation.at(arguments[0])[:1])
         return 0
+
+    def has_jacobian(self) -> bool:
+        return True
+
+    def get_jacobian(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]
+    ) -> ca.Function:
+        """Jacobian as CasADi's calculus wants it: asked for when a solver is built, not when it runs."""
+        self._gradient = _Derivatives(self.evaluation)
+        x, p, f = ca.MX.sym("x", 3), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
+        row = self._gradient(x, p)[1].T
+        return ca.Function(name, [x, p, f], [row, ca.MX(1, 0)], inputs, outputs, options)
 
 
 class _Derivatives(_Callback):
@@ -169,7 +183,7 @@ class _Derivatives(_Callback):
 
 class _Hessian(_Callback):
     inputs = ("x", "p", "lam_f", "lam_g")
-    outputs = ("triu_hess_gamma_x_x",)
+    outputs = ("hess_gamma_x_x",)
 
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
         factor = np.frombuffer(arguments[2], dtype=np.float64)[0]

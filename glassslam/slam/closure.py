@@ -120,7 +120,12 @@ def close(
             return refuse("low score")
         guess = found.pose
     match = match_scan(
-        grid, scene.fine, guess, translation_weight=_WEAK_WEIGHT, rotation_weight=_WEAK_WEIGHT, max_iterations=30
+        grid,
+        scene.fine,
+        guess,
+        translation_weight=_WEAK_WEIGHT,
+        rotation_weight=_WEAK_WEIGHT,
+        max_iterations=30,
     )
     if match.residual > min(max(0.45, 1.1 * scene.residual + 0.03), config.max_residual):
         return refuse("poor fit")

@@ -60,22 +60,22 @@ class PoseExtrapolator:
         """Take a yaw rate."""
         self.yaw.add(imu)
 
-    def add_pose(self, stamp: float, pose_in_local: FloatArray) -> None:
-        """Take the matched pose of a scan."""
+    def add_pose(self, stamp: float, pose_in_local: FloatArray, odometry_pose: FloatArray | None) -> None:
+        """Take the matched pose of a scan, and where the odometry was at it."""
         step = stamp - self._stamp
         if _SHORTEST_STEP < step < _LONGEST_STEP:
             self._velocity = between(self._pose, pose_in_local) / step
         else:
             self._velocity = None
         self._stamp, self._pose = stamp, pose_in_local
-        self._odometry_pose = self.odometry.pose_at(stamp)
+        self._odometry_pose = odometry_pose
         self._heading = self.yaw.angle_at(stamp)
 
-    def predict(self, stamp: float) -> Prediction:
-        """Expected pose at the stamp of the next scan."""
+    def predict(self, stamp: float, odometry_pose: FloatArray | None) -> Prediction:
+        """Expected pose of the next scan, from its stamp and the pose of the odometry at it, if known."""
         step = stamp - self._stamp
         coasting = self._coast(step)
-        moved = self._odometry_motion(stamp)
+        moved = self._odometry_motion(odometry_pose)
         motion = moved if moved is not None else self._turn_by_imu(stamp, coasting)
         alternative = None
         if moved is not None and coasting is not None:
@@ -92,8 +92,7 @@ class PoseExtrapolator:
             moved is not None,
         )
 
-    def _odometry_motion(self, stamp: float) -> FloatArray | None:
-        now = self.odometry.pose_at(stamp)
+    def _odometry_motion(self, now: FloatArray | None) -> FloatArray | None:
         if now is None or self._odometry_pose is None:
             return None
         return between(self._odometry_pose, now)

@@ -57,7 +57,11 @@ class GlobalSlam:
         self._step_weight = np.diag(
             1.0
             / np.array(
-                [noise.odometry_translation_noise, noise.odometry_translation_noise, noise.odometry_rotation_noise]
+                [
+                    noise.odometry_translation_noise,
+                    noise.odometry_translation_noise,
+                    noise.odometry_rotation_noise,
+                ]
             )
         )
 
@@ -70,9 +74,7 @@ class GlobalSlam:
             last = self.nodes[-1]
             step = between(last.pose_in_local, node.pose_in_local)
             self.graph.add_pose(compose(self.graph.poses[-1], step))
-            self.graph.add_constraints(
-                [last.index], [node.index], step[None], self._step_weight, "odometry"
-            )
+            self.graph.add_constraints([last.index], [node.index], step[None], self._step_weight, "odometry")
             self._travel.append(self._travel[-1] + float(np.hypot(step[0], step[1])))
         self.nodes.append(node)
         if len(self.nodes) % self._config.optimization.optimize_every_n_nodes == 0:

@@ -128,7 +128,9 @@ class LocalSlam:
             points,
             start,
             occupied_space_weight=local.occupied_space_weight,
-            translation_weight=trust * local.translation_weight / math.sqrt(prediction.distance + _CALM_DISTANCE),
+            translation_weight=trust
+            * local.translation_weight
+            / math.sqrt(prediction.distance + _CALM_DISTANCE),
             rotation_weight=trust * local.rotation_weight / math.sqrt(prediction.rotation + _CALM_ROTATION),
             max_iterations=local.max_num_iterations,
         )
@@ -144,7 +146,11 @@ class LocalSlam:
         local = self._config.local
         self.searches += 1
         start = search_around(
-            grid, points, found.pose, local.search_linear_window, math.radians(local.search_angular_window_deg)
+            grid,
+            points,
+            found.pose,
+            local.search_linear_window,
+            math.radians(local.search_angular_window_deg),
         )
         refined = self._refine(grid, points, start)
         if refined.residual < found.residual - 0.05:

@@ -24,7 +24,12 @@ CHI_SQUARE_LIMIT = 20.0
 
 
 def select(
-    graph: PoseGraph, nodes: Sequence[Node], submaps: Sequence[Submap], first: int, last: int, config: LoopClosureConfig
+    graph: PoseGraph,
+    nodes: Sequence[Node],
+    submaps: Sequence[Submap],
+    first: int,
+    last: int,
+    config: LoopClosureConfig,
 ) -> list[Candidate]:
     """Searches for the nodes `first` .. `last` - 1 in finished submaps.
 
@@ -68,7 +73,8 @@ def _nearest_pairs(
     if queries.size == 0 or not _may_be_near(poses[queries, :2], poses[members, :2]):
         return []
     gaps = np.hypot(
-        poses[queries, 0][:, None] - poses[members, 0][None], poses[queries, 1][:, None] - poses[members, 1][None]
+        poses[queries, 0][:, None] - poses[members, 0][None],
+        poses[queries, 1][:, None] - poses[members, 1][None],
     )
     nearest = gaps.argmin(axis=1)
     distances = gaps[np.arange(len(queries)), nearest]

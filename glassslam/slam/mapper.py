@@ -10,6 +10,7 @@ from glassslam.errors import NoScansError
 from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
 from glassslam.slam.extrapolator import PoseExtrapolator
 from glassslam.slam.global_slam import GlobalSlam
+from glassslam.slam.odometry_track import mend_late_stamps
 from glassslam.slam.local import LocalSlam, prepared
 from glassslam.slam.range_data import prepare
 from glassslam.slam.render import render
@@ -19,6 +20,7 @@ from glassslam.slam.trajectory import corrected_poses
 
 _LONGEST_WAIT = 1.0
 _MOST_WAITING = 200
+_LOOK_AHEAD = 3
 
 
 class Mapper:
@@ -50,7 +52,8 @@ class Mapper:
         self._extrapolator = PoseExtrapolator()
         self._local = LocalSlam(self._config)
         self._global = GlobalSlam(self._config, self._stages)
-        self._waiting: deque[LaserScan] = deque()
+        self._waiting: deque[tuple[LaserScan, FloatArray | None]] = deque()
+        self._times: list[float] = []
         self._stamps: list[float] = []
         self._poses: list[FloatArray] = []
         self._read = 0
@@ -59,7 +62,8 @@ class Mapper:
     def add(self, record: Record) -> None:
         """Take one record, in the order of the recording.
 
-        A scan waits until odometry reaches its stamp, at most a second of recorded time.
+        A scan waits for the next few and until odometry reaches its stamp, at most a second of recorded
+        time.
         """
         if isinstance(record, LaserScan):
             self._add_scan(record)
@@ -67,8 +71,8 @@ class Mapper:
             self._extrapolator.add_odometry(record)
         elif isinstance(record, Imu):
             self._extrapolator.add_imu(record)
-        while self._waiting and self._is_ready(self._waiting[0]):
-            self._process(self._waiting.popleft())
+        while len(self._waiting) > _LOOK_AHEAD and self._is_ready(self._times[0]):
+            self._process(*self._waiting.popleft())
 
     def finish(self, info: RecordingInfo | None = None) -> MapResult:
         """Process what waits, close the last loops, optimise and render.
@@ -79,7 +83,7 @@ class Mapper:
             Not one usable scan came in.
         """
         while self._waiting:
-            self._process(self._waiting.popleft())
+            self._process(*self._waiting.popleft())
         for submap in self._local.finish():
             self._global.add_submap(submap)
         if not self._global.nodes:
@@ -102,25 +106,27 @@ class Mapper:
         reason = _unusable(scan)
         if reason:
             self._dropped[reason] += 1
-        else:
-            self._waiting.append(scan)
-
-    def _is_ready(self, scan: LaserScan) -> bool:
-        """Whether odometry has reached the scan, or there is none to wait for."""
+            return
         track = self._extrapolator.odometry
-        if len(track) == 0:
-            return len(self._waiting) > _MOST_WAITING or self._waited(scan)
-        return track.latest >= scan.stamp or self._waited(scan)
+        mend_late_stamps(self._times, scan.stamp)
+        self._waiting.append((scan, track.latest_pose if track.latest == scan.stamp else None))
+        self._times.append(scan.stamp)
 
-    def _waited(self, scan: LaserScan) -> bool:
-        return abs(self._waiting[-1].stamp - scan.stamp) > _LONGEST_WAIT or len(self._waiting) > _MOST_WAITING
+    def _is_ready(self, time: float) -> bool:
+        """Whether odometry has reached a time, or is not coming."""
+        if self._extrapolator.odometry.latest >= time or len(self._waiting) > _MOST_WAITING:
+            return True
+        return abs(self._times[-1] - time) > _LONGEST_WAIT
 
-    def _process(self, scan: LaserScan) -> None:
+    def _process(self, scan: LaserScan, paired: FloatArray | None) -> None:
+        """Place one scan; `paired` is the odometry recorded together with it, if any."""
+        time = self._times.pop(0)
         with self._stages.measure("local SLAM"):
-            prediction = self._extrapolator.predict(scan.stamp)
+            odometry = self._extrapolator.odometry.pose_at(time) if paired is None else paired
+            prediction = self._extrapolator.predict(time, odometry)
             data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor)
             result = self._local.add(prepared(data, self._config.filter.voxel_filter_size), prediction)
-            self._extrapolator.add_pose(scan.stamp, result.pose_in_local)
+            self._extrapolator.add_pose(time, result.pose_in_local, odometry)
             self._stamps.append(scan.stamp)
             self._poses.append(result.pose_in_local)
         if result.finished is not None:
@@ -175,6 +181,9 @@ def _unusable(scan: LaserScan) -> str:
         return "stamp not finite"
     if len(scan.ranges) == 0:
         return "no beams"
-    if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)) or scan.angle_increment == 0:
+    if (
+        not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment))
+        or scan.angle_increment == 0
+    ):
         return "angles not usable"
     return ""

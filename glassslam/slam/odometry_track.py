@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_right
 from collections import deque
+from collections.abc import MutableSequence
 
 import numpy as np
 
@@ -11,6 +12,25 @@ from glassslam.records import FloatArray, Imu, Odometry
 
 _KEPT = 512
 _LONGEST_EXTRAPOLATION = 0.5
+_MOST_LATE = 4
+
+
+def mend_late_stamps(times: MutableSequence[float], following: float) -> None:
+    """Move up to four late stamps at the end of `times` before the stamp of the record that follows, s.
+
+    Old loggers stamp single records up to a second late, though they write them in the right order.
+    Late stamps are spread evenly between the last good one and the following one. A clock that really
+    stepped back (no good stamp within reach) is left alone.
+    """
+    good = len(times) - 1
+    while good >= 0 and times[good] > following and len(times) - good <= _MOST_LATE:
+        good -= 1
+    late = len(times) - 1 - good
+    if good < 0 or late == 0 or times[good] > following:
+        return
+    step = (following - times[good]) / (late + 1)
+    for k in range(late):
+        times[good + 1 + k] = times[good] + (k + 1) * step
 
 
 class OdometryTrack:
@@ -32,11 +52,17 @@ class OdometryTrack:
         """Stamp of the last pose that arrived, s; -inf before the first."""
         return self._stamps[-1] if self._stamps else -math.inf
 
+    @property
+    def latest_pose(self) -> FloatArray | None:
+        """The last pose that arrived, shape (3,)."""
+        return self._poses[-1] if self._poses else None
+
     def add(self, odometry: Odometry) -> None:
         """Take a pose; one that is not finite is counted in `dropped` and left out."""
         if not (math.isfinite(odometry.stamp) and all(map(math.isfinite, odometry.pose))):
             self.dropped += 1
             return
+        mend_late_stamps(self._stamps, odometry.stamp)
         self._stamps.append(odometry.stamp)
         self._poses.append(np.array(odometry.pose))
 
