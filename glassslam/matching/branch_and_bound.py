@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.grid.probability_grid import ProbabilityGrid, point_array
-from glassslam.matching.search_kernels import branch_and_bound, discretise, max_over_windows, quantise
+from glassslam.matching.pyramid_kernels import max_over_windows, quantise
+from glassslam.matching.search_kernels import branch_and_bound, discretise
 from glassslam.records import Float32Array, FloatArray
 
 
@@ -67,7 +68,7 @@ class BranchAndBoundMatcher:
         self.cell = grid.resolution * coarsening
         self.origin = grid.origin.copy()
         self._reach = math.ceil(max_linear_window / self.cell)
-        depth = int(math.log2(max(1, self._reach))) + 1
+        depth = max(self._reach, 1).bit_length()
         self._pad = 2 * self._reach + (1 << depth)
         rows, columns = (-(-n // coarsening) for n in grid.cells.shape)
         self._shape = (rows, columns)
@@ -130,7 +131,7 @@ class BranchAndBoundMatcher:
             points, corner[0], corner[1], guess[2] - half * step, step, count, 1.0 / self.cell,
             *self._shape, self._pad, self._reach + (1 << (len(self._levels) - 1)), index, lengths,
         )  # fmt: skip
-        start = min(len(self._levels) - 1, max(0, int(math.log2(max(1, window)))))
+        start = max(window, 1).bit_length() - 1
         found = np.zeros(3, dtype=np.int64)
         # scores are whole numbers; those of `min_score` itself count
         threshold = math.ceil(min_score * 255.0 * len(points) - 1e-6) - 1

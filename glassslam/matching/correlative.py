@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from glassslam.grid.probability_grid import ProbabilityGrid
-from glassslam.matching.search_kernels import exhaustive_search
+from glassslam.matching.exhaustive_kernels import exhaustive_search
 from glassslam.records import FloatArray
 
 _FARTHEST = 15.0

@@ -67,7 +67,8 @@ def match_scan(
         Where to stop: "lm" when a step is shorter (m; a third of it in rad) or saves a smaller share
         of the cost, "casadi" when the gradient is smaller.
     solver : {"lm", "casadi"}
-        The project's Levenberg-Marquardt loop, or CasADi's sqpmethod on the same kernel.
+        The project's loop (Levenberg-Marquardt on exact second derivatives), or CasADi's sqpmethod
+        on the same kernel.
 
     Raises
     ------
@@ -96,10 +97,12 @@ def match_scan(
         from glassslam.matching import sqp  # noqa: PLC0415  (0.16 s)
 
         pose, iterations = sqp.minimise(problem, max_iterations, tolerance)
-        spent = weight * normal_equations(*problem.arguments[:5], pose, information, np.empty(3))
+        arguments = (*problem.arguments[:5], pose, information, np.empty(3))
+        spent = weight * normal_equations(*arguments)
         information *= weight
     elif solver == "lm":
-        cost, iterations = align(*problem.arguments, max_iterations, pose, information, tolerance)
+        arguments = (*problem.arguments, max_iterations, pose, information, tolerance)
+        cost, iterations = align(*arguments)
         spent = cost - float(prior @ (pose - start) ** 2)
     else:
         raise GridError(f"unknown solver {solver!r}", "known are lm and casadi")

@@ -1,4 +1,4 @@
-"""Kernel that follows the fit of a scan along a line: how far could it slide unnoticed?"""
+"""Kernel that follows the fit of a scan along a line, to tell how far it could slide unnoticed."""
 
 import math
 

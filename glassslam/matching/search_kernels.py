@@ -1,7 +1,4 @@
-"""Kernels of the correlative searches: max grids, discretised scans, branch and bound, exhaustive search.
-
-Branch and bound follows Hess et al. 2016, section V.
-"""
+"""Kernels of branch and bound: discretised scans and the search itself (Hess et al. 2016, section V)."""
 
 import math
 
@@ -9,43 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.accelerate import kernel
-from glassslam.grid.kernels import Cells
-from glassslam.records import Float32Array, FloatArray
+from glassslam.matching.pyramid_kernels import Bytes
+from glassslam.records import FloatArray
 
-Bytes = NDArray[np.uint8]
 Int32s = NDArray[np.int32]
 Integers = NDArray[np.int64]
-
-
-@kernel
-def max_over_windows(source: Bytes, shift: int, out: Bytes) -> None:
-    """Maxima over windows of twice the edge, from a grid of maxima over windows of edge `shift`.
-
-    out[y, x] = max of source at the four corners (y or y + shift, x or x + shift), cut at the border.
-    """
-    rows, columns = source.shape
-    inner = max(columns - shift, 0)
-    for y in range(rows):
-        y2 = min(y + shift, rows - 1)
-        # without a bound to test the compiler takes many cells at a time
-        for x in range(inner):
-            out[y, x] = max(source[y, x], source[y, x + shift], source[y2, x], source[y2, x + shift])
-        for x in range(inner, columns):
-            last = columns - 1
-            out[y, x] = max(source[y, x], source[y, last], source[y2, x], source[y2, last])
-
-
-@kernel
-def quantise(cells: Cells, scores: Float32Array, factor: int, pad: int, out: Bytes) -> None:
-    """Scores of a cell grid as bytes, the maximum of each factor x factor block, `pad` zeros around."""
-    rows, columns = cells.shape
-    for y in range(rows):
-        for x in range(columns):
-            value = cells[y, x]
-            if value:
-                byte = np.uint8(scores[value] * 255.0 + 0.5)
-                r, c = y // factor + pad, x // factor + pad
-                out[r, c] = max(out[r, c], byte)
 
 
 @kernel
@@ -213,55 +178,4 @@ def branch_and_bound(
         dx = k % offsets * step - window
         candidate = (a, dx, dy, int(flat[k]))
         best = _descend(levels, stride, index, lengths, window, start_level, candidate, best, found, stack)
-    return best
-
-
-@kernel
-def exhaustive_search(
-    cells: Cells,
-    table: Float32Array,
-    origin: FloatArray,
-    inverse_resolution: float,
-    points: FloatArray,
-    guess: FloatArray,
-    steps: int,
-    angle_steps: int,
-    angle_step: float,
-    translation_cost: float,
-    rotation_cost: float,
-    pose: FloatArray,
-) -> float:
-    """Best pose on the raster of cells and angles around a guess; returns its penalised score.
-
-    Score: mean P(occupied) of the cells hit, times exp(-(translation_cost |t| + rotation_cost |theta|)^2)
-    as in Cartographer's real-time correlative matcher. `steps` is the half window in cells.
-    """
-    rows, columns = cells.shape
-    best = -1.0
-    count = points.shape[0]
-    for a in range(-angle_steps, angle_steps + 1):
-        cosine, sine = math.cos(guess[2] + a * angle_step), math.sin(guess[2] + a * angle_step)
-        side = 2 * steps + 1
-        sums = np.zeros((side, side), dtype=np.float32)
-        for k in range(count):
-            px, py = points[k, 0], points[k, 1]
-            c = math.floor((cosine * px - sine * py + guess[0] - origin[0]) * inverse_resolution) - steps
-            r = math.floor((sine * px + cosine * py + guess[1] - origin[1]) * inverse_resolution) - steps
-            if c < 0 or r < 0 or c + side > columns or r + side > rows:
-                continue
-            for dy in range(side):
-                for dx in range(side):
-                    value = cells[r + dy, c + dx]
-                    if value:
-                        sums[dy, dx] += table[value]
-        for dy in range(side):
-            for dx in range(side):
-                shift = math.hypot(dx - steps, dy - steps) / inverse_resolution
-                cost = translation_cost * shift + rotation_cost * abs(a * angle_step)
-                score = sums[dy, dx] / count * math.exp(-cost * cost)
-                if score > best:
-                    best = score
-                    pose[0] = guess[0] + (dx - steps) / inverse_resolution
-                    pose[1] = guess[1] + (dy - steps) / inverse_resolution
-                    pose[2] = guess[2] + a * angle_step
     return best

@@ -55,11 +55,12 @@ class SqpSolver:
         self._solver = ca.nlpsol("match", "sqpmethod", {"x": x, "f": cost(x, ca.DM(0, 0))}, options)
         self._start, self._found = np.zeros(3), np.zeros(3)
         self._low, self._high = np.full(3, -np.inf), np.full(3, np.inf)
-        self._buffer, self._run = self._solver.buffer()
+        buffer: Any
+        buffer, self._run = self._solver.buffer()
         # bounds that are not set read as zero
         for name, array in (("x0", self._start), ("lbx", self._low), ("ubx", self._high)):
-            self._buffer.set_arg(self._solver.index_in(name), array.data)
-        self._buffer.set_res(self._solver.index_out("x"), self._found.data)
+            buffer.set_arg(self._solver.index_in(name), array.data)
+        buffer.set_res(self._solver.index_out("x"), self._found.data)
 
     def solve(self, problem: MatchProblem) -> tuple[FloatArray, int]:
         """Pose of least cost and the number of evaluations."""
@@ -106,7 +107,8 @@ class _Evaluation:
         """Cost, gradient (3) and Gauss-Newton Hessian (9) at the pose in a buffer."""
         pose = np.frombuffer(buffer, dtype=np.float64)
         if not (pose == self._at).all():
-            objective(*self._problem.arguments, pose, self._values)
+            arguments = (*self._problem.arguments, pose, self._values)
+            objective(*arguments)
             self._at[:] = pose
             self.count += 1
         return self._values

@@ -30,6 +30,8 @@ class Prediction:
         robots freezes and jumps.
     measured : bool
         Whether odometry stands behind the prediction.
+    after_gap : bool
+        Whether the recording is silent for so long before the scan that the robot may be anywhere near.
     """
 
     pose_in_local: FloatArray
@@ -38,6 +40,7 @@ class Prediction:
     twist: FloatArray
     alternative: FloatArray | None
     measured: bool
+    after_gap: bool
 
 
 class PoseExtrapolator:
@@ -90,6 +93,7 @@ class PoseExtrapolator:
             twist,
             alternative,
             moved is not None,
+            not 0.0 < step < _LONGEST_STEP,
         )
 
     def _odometry_motion(self, now: FloatArray | None) -> FloatArray | None:

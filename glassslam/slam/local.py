@@ -23,8 +23,9 @@ _CALM_ROTATION = 0.05
 _WEAK_WEIGHT = 0.03
 _COASTING_SHARE = 0.3
 _LOST_RATIO = 1.15
+_LOST_AFTER_GAP = 1.05
 _LOST_WINDOW, _LOST_TURN = 1.5, 2.0
-_LOST_SCORE = 0.6
+_LOST_SCORE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +113,8 @@ class LocalSlam:
                 self.coasted += 1
         if self._is_doubtful(best, prediction):
             best = self._search(submap.grid, points, best)
-        if best.residual > _LOST_RATIO * self._usual_residual + 0.02:
+        limit = _LOST_AFTER_GAP if prediction.after_gap else _LOST_RATIO
+        if best.residual > limit * self._usual_residual + 0.02:
             best = self._relocalise(submap.grid, points, best)
         self._usual_residual = 0.9 * self._usual_residual + 0.1 * best.residual
         return best.pose, best.residual
@@ -167,7 +169,7 @@ class LocalSlam:
         if match is None:
             return found
         refined = self._refine(grid, points, match.pose)
-        if refined.residual < found.residual - 0.05:
+        if refined.residual < found.residual - 0.03:
             self.relocalised += 1
             return refined
         return found

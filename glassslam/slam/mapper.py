@@ -11,16 +11,17 @@ from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, Reco
 from glassslam.slam.extrapolator import PoseExtrapolator
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.odometry_track import mend_late_stamps
-from glassslam.slam.local import LocalSlam, prepared
+from glassslam.slam.local import LocalResult, LocalSlam, prepared
 from glassslam.slam.range_data import prepare
 from glassslam.slam.render import render
-from glassslam.slam.result import MapResult, RunStatistics
+from glassslam.slam.result import MapResult, OccupancyMap, RunStatistics
 from glassslam.slam.stopwatch import Stages
 from glassslam.slam.trajectory import corrected_poses
 
 _LONGEST_WAIT = 1.0
 _MOST_WAITING = 200
 _LOOK_AHEAD = 3
+_BATCH = 16
 
 
 class Mapper:
@@ -71,8 +72,8 @@ class Mapper:
             self._extrapolator.add_odometry(record)
         elif isinstance(record, Imu):
             self._extrapolator.add_imu(record)
-        while len(self._waiting) > _LOOK_AHEAD and self._is_ready(self._times[0]):
-            self._process(*self._waiting.popleft())
+        if len(self._waiting) > _BATCH:
+            self._process_waiting(_LOOK_AHEAD)
 
     def finish(self, info: RecordingInfo | None = None) -> MapResult:
         """Process what waits, close the last loops, optimise and render.
@@ -82,8 +83,7 @@ class Mapper:
         NoScansError
             Not one usable scan came in.
         """
-        while self._waiting:
-            self._process(*self._waiting.popleft())
+        self._process_waiting(0)
         for submap in self._local.finish():
             self._global.add_submap(submap)
         if not self._global.nodes:
@@ -118,23 +118,31 @@ class Mapper:
             return True
         return abs(self._times[-1] - time) > _LONGEST_WAIT
 
-    def _process(self, scan: LaserScan, paired: FloatArray | None) -> None:
-        """Place one scan; `paired` is the odometry recorded together with it, if any."""
-        time = self._times.pop(0)
+    def _process_waiting(self, left: int) -> None:
+        """Place the waiting scans that are ready, all but the last `left`."""
+        placed = []
         with self._stages.measure("local SLAM"):
-            odometry = self._extrapolator.odometry.pose_at(time) if paired is None else paired
-            prediction = self._extrapolator.predict(time, odometry)
-            data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor)
-            result = self._local.add(prepared(data, self._config.filter.voxel_filter_size), prediction)
-            self._extrapolator.add_pose(time, result.pose_in_local, odometry)
-            self._stamps.append(scan.stamp)
-            self._poses.append(result.pose_in_local)
-        if result.finished is not None:
-            self._global.add_submap(result.finished)
-        if result.node is not None:
-            self._global.add_node(result.node)
+            while len(self._waiting) > left and (left == 0 or self._is_ready(self._times[0])):
+                placed.append(self._place(*self._waiting.popleft()))
+        for result in placed:
+            if result.finished is not None:
+                self._global.add_submap(result.finished)
+            if result.node is not None:
+                self._global.add_node(result.node)
 
-    def _result(self, grid: object, info: RecordingInfo | None) -> MapResult:
+    def _place(self, scan: LaserScan, paired: FloatArray | None) -> LocalResult:
+        """Match one scan; `paired` is the odometry recorded together with it, if any."""
+        time = self._times.pop(0)
+        odometry = self._extrapolator.odometry.pose_at(time) if paired is None else paired
+        prediction = self._extrapolator.predict(time, odometry)
+        data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor)
+        result = self._local.add(prepared(data, self._config.filter.voxel_filter_size), prediction)
+        self._extrapolator.add_pose(time, result.pose_in_local, odometry)
+        self._stamps.append(scan.stamp)
+        self._poses.append(result.pose_in_local)
+        return result
+
+    def _result(self, grid: OccupancyMap, info: RecordingInfo | None) -> MapResult:
         nodes = self._global.nodes
         poses = np.array(self._global.poses)
         every = corrected_poses(
