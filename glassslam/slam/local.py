@@ -24,6 +24,7 @@ _WEAK_WEIGHT = 0.03
 _COASTING_SHARE = 0.3
 _LOST_RATIO = 1.15
 _LOST_AFTER_GAP = 1.05
+_SETTLING_SCANS = 5
 _LOST_WINDOW, _LOST_TURN = 1.5, 2.0
 _LOST_SCORE = 0.5
 
@@ -67,6 +68,7 @@ class LocalSlam:
         self._motion_filter = MotionFilter(config.motion_filter)
         self._usual_residual = 0.5
         self._scans = 0
+        self._since_gap = 0
         self._nodes = 0
         self.searches = self.searches_taken = self.coasted = self.unmatched = 0
         self.relocalisations = self.relocalised = 0
@@ -113,9 +115,12 @@ class LocalSlam:
                 self.coasted += 1
         if self._is_doubtful(best, prediction):
             best = self._search(submap.grid, points, best)
-        limit = _LOST_AFTER_GAP if prediction.after_gap else _LOST_RATIO
+        self._since_gap = 0 if prediction.after_gap else self._since_gap + 1
+        unsettled = self._since_gap < _SETTLING_SCANS
+        limit = _LOST_AFTER_GAP if unsettled else _LOST_RATIO
         if best.residual > limit * self._usual_residual + 0.02:
-            best = self._relocalise(submap.grid, points, best)
+            # in a corridor a slide along it always fits a little better somewhere
+            best = self._relocalise(submap.grid, points, best, 0.03 if unsettled else 0.08)
         self._usual_residual = 0.9 * self._usual_residual + 0.1 * best.residual
         return best.pose, best.residual
 
@@ -160,8 +165,13 @@ class LocalSlam:
             return refined
         return found
 
-    def _relocalise(self, grid: ProbabilityGrid, points: FloatArray, found: MatchResult) -> MatchResult:
-        """Branch and bound in the submap after tracking was lost, as after a gap in the recording."""
+    def _relocalise(
+        self, grid: ProbabilityGrid, points: FloatArray, found: MatchResult, gain: float
+    ) -> MatchResult:
+        """Branch and bound in the submap after tracking was lost, as after a gap in the recording.
+
+        The new place is taken when its residual is lower by `gain`.
+        """
         self.relocalisations += 1
         matcher = BranchAndBoundMatcher(grid, _LOST_WINDOW)
         coarse = points[:: max(1, len(points) // 150)]
@@ -169,7 +179,7 @@ class LocalSlam:
         if match is None:
             return found
         refined = self._refine(grid, points, match.pose)
-        if refined.residual < found.residual - 0.03:
+        if refined.residual < found.residual - gain:
             self.relocalised += 1
             return refined
         return found
