@@ -17,6 +17,7 @@ from glassslam.records import Float32Array, FloatArray
 FIRST_DAMPING = 1.0
 LARGEST_DAMPING = 1e8
 LEAST_CURVATURE = 1e-9
+"""Keeps the directions that neither walls nor prior hold."""
 LONGEST_STEP = 0.1
 """Farthest the surface is trusted to curve as it does here, m and rad: two cells."""
 
@@ -152,7 +153,6 @@ def newton_step(
         scale[a] = weight * hessian[a, a] + prior[a]
         for b in range(3):
             system[a, b] = weight * (hessian[a, b] + curvature[a, b])
-        # the last term keeps directions that neither walls nor prior hold
         system[a, a] += prior[a] + damping * scale[a] + LEAST_CURVATURE
     if solve_symmetric(system, right, step) and max(abs(step[0]), abs(step[1]), abs(step[2])) < LONGEST_STEP:
         return True
@@ -244,7 +244,7 @@ def objective(
         for b in range(3):
             hessian[a, b] *= weight
             curvature[a, b] = hessian[a, b] + weight * curvature[a, b]
-        hessian[a, a] += prior[a]
+        hessian[a, a] += prior[a] + LEAST_CURVATURE
         curvature[a, a] += prior[a]
     exact = solve_symmetric(curvature, gradient, np.empty(3))
     out[4:] = 2.0 * (curvature if exact else hessian).ravel()

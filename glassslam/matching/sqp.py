@@ -55,19 +55,21 @@ class SqpSolver:
         self._solver = ca.nlpsol("match", "sqpmethod", {"x": x, "f": cost(x, ca.DM(0, 0))}, options)
         self._start, self._found = np.zeros(3), np.zeros(3)
         self._low, self._high = np.full(3, -np.inf), np.full(3, np.inf)
-        buffer: Any
-        buffer, self._run = self._solver.buffer()
+        self._buffer: Any
+        self._buffer, self._run = self._solver.buffer()
         # bounds that are not set read as zero
         for name, array in (("x0", self._start), ("lbx", self._low), ("ubx", self._high)):
-            buffer.set_arg(self._solver.index_in(name), array.data)
-        buffer.set_res(self._solver.index_out("x"), self._found.data)
+            self._buffer.set_arg(self._solver.index_in(name), array.data)
+        self._buffer.set_res(self._solver.index_out("x"), self._found.data)
 
     def solve(self, problem: MatchProblem) -> tuple[FloatArray, int]:
         """Pose of least cost and the number of evaluations."""
         self._evaluation.begin(problem)
         self._start[:] = problem.prediction
         self._run()
-        return self._found.copy(), self._evaluation.count
+        # without any hold the quadratic problem may have no solution
+        pose = self._found if np.isfinite(self._found).all() else self._start
+        return pose.copy(), self._evaluation.count
 
 
 def _options(max_iterations: int, tolerance: float) -> dict[str, Any]:

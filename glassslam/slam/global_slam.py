@@ -19,6 +19,7 @@ from glassslam.slam.node import Node
 from glassslam.slam.stopwatch import Stages
 
 _LOOK_AHEAD = 45
+_DOUBT = 5.0
 
 
 class GlobalSlam:
@@ -74,7 +75,8 @@ class GlobalSlam:
             last = self.nodes[-1]
             step = between(last.pose_in_local, node.pose_in_local)
             self.graph.add_pose(compose(self.graph.poses[-1], step))
-            self.graph.add_constraints([last.index], [node.index], step[None], self._step_weight, "odometry")
+            weight = self._step_weight / (_DOUBT if node.doubtful else 1.0)
+            self.graph.add_constraints([last.index], [node.index], step[None], weight, "odometry")
             self._travel.append(self._travel[-1] + float(np.hypot(step[0], step[1])))
         self.nodes.append(node)
         if len(self.nodes) % self._config.optimization.optimize_every_n_nodes == 0:

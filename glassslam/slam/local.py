@@ -69,6 +69,7 @@ class LocalSlam:
         self._usual_residual = 0.5
         self._scans = 0
         self._since_gap = 0
+        self._doubtful = False
         self._nodes = 0
         self.searches = self.searches_taken = self.coasted = self.unmatched = 0
         self.relocalisations = self.relocalised = 0
@@ -82,9 +83,10 @@ class LocalSlam:
             return LocalResult(pose, None, [], None)
         node = Node(
             self._nodes, scan, data.stamp, pose, data.sensor, data.returns.astype(np.float32),
-            data.free_ends.astype(np.float32), residual,
+            data.free_ends.astype(np.float32), residual, self._doubtful,
         )  # fmt: skip
         self._nodes += 1
+        self._doubtful = False
         entered, finished = self._submaps.insert(
             node.index,
             pose,
@@ -113,9 +115,11 @@ class LocalSlam:
             if coasting.residual < best.residual - 0.02:
                 best = coasting
                 self.coasted += 1
+                self._doubtful = True
         if self._is_doubtful(best, prediction):
             best = self._search(submap.grid, points, best)
         self._since_gap = 0 if prediction.after_gap else self._since_gap + 1
+        self._doubtful |= prediction.after_gap and prediction.distance + prediction.rotation > _CALM_DISTANCE
         unsettled = self._since_gap < _SETTLING_SCANS
         limit = _LOST_AFTER_GAP if unsettled else _LOST_RATIO
         if best.residual > limit * self._usual_residual + 0.02:
@@ -162,6 +166,7 @@ class LocalSlam:
         refined = self._refine(grid, points, start)
         if refined.residual < found.residual - 0.05:
             self.searches_taken += 1
+            self._doubtful = True
             return refined
         return found
 
@@ -181,6 +186,7 @@ class LocalSlam:
         refined = self._refine(grid, points, match.pose)
         if refined.residual < found.residual - gain:
             self.relocalised += 1
+            self._doubtful = True
             return refined
         return found
 

@@ -1,6 +1,5 @@
 """The mapper: records in, a map out."""
 
-import math
 from collections import Counter, deque
 
 import numpy as np
@@ -10,11 +9,12 @@ from glassslam.errors import NoScansError
 from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
 from glassslam.slam.extrapolator import PoseExtrapolator
 from glassslam.slam.global_slam import GlobalSlam
-from glassslam.slam.odometry_track import mend_late_stamps
 from glassslam.slam.local import LocalResult, LocalSlam, prepared
+from glassslam.slam.odometry_track import mend_late_stamps
 from glassslam.slam.range_data import prepare
 from glassslam.slam.render import render
 from glassslam.slam.result import MapResult, OccupancyMap, RunStatistics
+from glassslam.slam.scan_check import defect, mended, sweep_time
 from glassslam.slam.stopwatch import Stages
 from glassslam.slam.trajectory import corrected_poses
 
@@ -103,10 +103,11 @@ class Mapper:
 
     def _add_scan(self, scan: LaserScan) -> None:
         self._read += 1
-        reason = _unusable(scan)
+        reason = defect(scan)
         if reason:
             self._dropped[reason] += 1
             return
+        scan = mended(scan)
         track = self._extrapolator.odometry
         mend_late_stamps(self._times, scan.stamp)
         self._waiting.append((scan, track.latest_pose if track.latest == scan.stamp else None))
@@ -137,7 +138,9 @@ class Mapper:
         prediction = self._extrapolator.predict(time, odometry)
         data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor)
         result = self._local.add(prepared(data, self._config.filter.voxel_filter_size), prediction)
-        self._extrapolator.add_pose(time, result.pose_in_local, odometry)
+        self._extrapolator.add_pose(
+            time, result.pose_in_local, odometry, 0.5 * sweep_time(scan), prediction.twist
+        )
         self._stamps.append(scan.stamp)
         self._poses.append(result.pose_in_local)
         return result
@@ -181,17 +184,3 @@ class Mapper:
             closures_rejected=rejected,
             residuals=self._global.residuals(),
         )
-
-
-def _unusable(scan: LaserScan) -> str:
-    """Why a scan cannot be used; empty when it can."""
-    if not math.isfinite(scan.stamp):
-        return "stamp not finite"
-    if len(scan.ranges) == 0:
-        return "no beams"
-    if (
-        not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment))
-        or scan.angle_increment == 0
-    ):
-        return "angles not usable"
-    return ""

@@ -25,6 +25,9 @@ class Node:
         Returns, and ends of the free space of silent beams, in the frame of the base, m.
     residual : float
         Root mean square of 1 - P(occupied) of the local match.
+    doubtful : bool
+        Whether the step from the node before was bridged rather than tracked: a gap in the recording, a
+        relocalisation, or odometry overruled.
     """
 
     index: int
@@ -35,3 +38,4 @@ class Node:
     returns: Float32Array
     free_ends: Float32Array
     residual: float
+    doubtful: bool = False

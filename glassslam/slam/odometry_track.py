@@ -2,7 +2,6 @@
 
 import math
 from bisect import bisect_right
-from collections import deque
 from collections.abc import MutableSequence
 
 import numpy as np
@@ -10,9 +9,11 @@ import numpy as np
 from glassslam.geometry import between, compose, interpolate
 from glassslam.records import FloatArray, Imu, Odometry
 
-_KEPT = 512
+_KEPT = 20_000
+_KEPT_BEFORE_STEP = 512
 _LONGEST_EXTRAPOLATION = 0.5
 _MOST_LATE = 4
+_CLOCK_STEP = 1.0
 
 
 def mend_late_stamps(times: MutableSequence[float], following: float) -> None:
@@ -34,14 +35,21 @@ def mend_late_stamps(times: MutableSequence[float], following: float) -> None:
 
 
 class OdometryTrack:
-    """The last few odometry poses, in the order they arrived.
+    """The last odometry poses, in the order they arrived.
 
-    Stamps may step back in old logs; an older stretch never overrules a newer one.
+    Stamps may step back in old logs; an older stretch never overrules a newer one. Enough is kept for
+    the scans that wait, however much slower than the odometry they come.
+
+    Attributes
+    ----------
+    dropped : int
+        Poses left out because they were not finite.
     """
 
     def __init__(self) -> None:
-        self._stamps: deque[float] = deque(maxlen=_KEPT)
-        self._poses: deque[FloatArray] = deque(maxlen=_KEPT)
+        self._stamps: list[float] = []
+        self._poses: list[FloatArray] = []
+        self._rising = 0
         self.dropped = 0
 
     def __len__(self) -> int:
@@ -63,8 +71,13 @@ class OdometryTrack:
             self.dropped += 1
             return
         mend_late_stamps(self._stamps, odometry.stamp)
+        if odometry.stamp < self.latest:
+            self._rising = len(self._stamps)
         self._stamps.append(odometry.stamp)
-        self._poses.append(np.array(odometry.pose))
+        self._poses.append(np.array(odometry.pose, dtype=np.float64))
+        if len(self._stamps) > 2 * _KEPT:
+            del self._stamps[:_KEPT], self._poses[:_KEPT]
+            self._rising = max(self._rising - _KEPT, 0)
 
     def pose_at(self, stamp: float) -> FloatArray | None:
         """Pose of the base in the odometry frame, shape (3,), or None where the track does not reach.
@@ -76,27 +89,41 @@ class OdometryTrack:
             return None
         if stamp >= self.latest:
             return self._extrapolate(stamp)
-        for k in range(len(self._stamps) - 2, -1, -1):
-            before, after = self._stamps[k], self._stamps[k + 1]
-            if before <= stamp < after:
-                return interpolate(self._poses[k], self._poses[k + 1], (stamp - before) / (after - before))
-        return None
+        k = self._enclosing(stamp)
+        if k < 0:
+            return None
+        before, after = self._stamps[k], self._stamps[k + 1]
+        return interpolate(self._poses[k], self._poses[k + 1], (stamp - before) / (after - before))
+
+    def _enclosing(self, stamp: float) -> int:
+        """Newest index whose pose and the next one enclose a stamp before the latest; -1 when none do."""
+        k = bisect_right(self._stamps, stamp, lo=self._rising) - 1
+        if k >= self._rising:
+            return k
+        for k in range(self._rising - 1, max(self._rising - _KEPT_BEFORE_STEP, 0) - 1, -1):
+            if self._stamps[k] <= stamp < self._stamps[k + 1]:
+                return k
+        return -1
 
     def _extrapolate(self, stamp: float) -> FloatArray | None:
         ahead = stamp - self.latest
-        if ahead == 0.0 or len(self._stamps) == 1:
-            return self._poses[-1] if ahead <= _LONGEST_EXTRAPOLATION else None
-        step = self.latest - self._stamps[-2]
         if ahead > _LONGEST_EXTRAPOLATION:
             return None
-        if not 0.0 < step <= _LONGEST_EXTRAPOLATION:
+        step = self.latest - self._stamps[-2] if len(self._stamps) > 1 else 0.0
+        if ahead == 0.0 or not 0.0 < step <= _LONGEST_EXTRAPOLATION:
             return self._poses[-1]
         motion = between(self._poses[-2], self._poses[-1])
         return compose(self._poses[-1], motion * (ahead / step))
 
 
 class YawTrack:
-    """Heading integrated from the yaw rates of an inertial sensor."""
+    """Heading integrated from the yaw rates of an inertial sensor.
+
+    Attributes
+    ----------
+    dropped : int
+        Rates left out because they were not finite or came late.
+    """
 
     def __init__(self) -> None:
         self._stamps: list[float] = []
@@ -105,18 +132,26 @@ class YawTrack:
         self.dropped = 0
 
     def add(self, imu: Imu) -> None:
-        """Take a rate; one that is not finite or not newer than the last is counted in `dropped`."""
+        """Take a rate; one that is not finite or not newer than the last is counted in `dropped`.
+
+        A stamp more than a second back is a clock that was set: the heading goes on from there. What
+        happened in a gap of more than half a second is not known; no turn is assumed.
+        """
         last = self._stamps[-1] if self._stamps else -math.inf
-        if not (math.isfinite(imu.stamp) and math.isfinite(imu.yaw_rate) and imu.stamp > last):
+        step = imu.stamp - last
+        if not (math.isfinite(imu.stamp) and math.isfinite(imu.yaw_rate)) or -_CLOCK_STEP <= step <= 0.0:
             self.dropped += 1
             return
-        angle = self._angles[-1] + imu.yaw_rate * (imu.stamp - last) if self._stamps else 0.0
+        angle = self._angles[-1] if self._angles else 0.0
+        if step < 0.0:
+            self._forget(len(self._stamps))
+        elif step <= _LONGEST_EXTRAPOLATION:
+            angle += imu.yaw_rate * step
         self._stamps.append(imu.stamp)
         self._angles.append(angle)
         self._rates.append(imu.yaw_rate)
-        if len(self._stamps) > 4 * _KEPT:
-            for values in (self._stamps, self._angles, self._rates):
-                del values[: 2 * _KEPT]
+        if len(self._stamps) > 2 * _KEPT:
+            self._forget(_KEPT)
 
     def angle_at(self, stamp: float) -> float | None:
         """Integrated heading, rad, or None farther than half a second from the known rates."""
@@ -124,3 +159,7 @@ class YawTrack:
         if k < 0 or stamp - self._stamps[k] > _LONGEST_EXTRAPOLATION:
             return None
         return self._angles[k] + self._rates[k] * (stamp - self._stamps[k])
+
+    def _forget(self, count: int) -> None:
+        for values in (self._stamps, self._angles, self._rates):
+            del values[:count]

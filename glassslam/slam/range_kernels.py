@@ -26,8 +26,9 @@ def beams_to_points(
 ) -> tuple[int, int]:
     """Write returns and free-ray ends in the base frame at the stamp of the scan; the two counts.
 
-    The base moves with a constant twist during the sweep. A beam of at least `no_echo` clears `ray_length`;
-    NaN, -inf, 0 and readings below `nearest` say nothing; those between `farthest` and `no_echo` clear too.
+    The base moves with a constant twist during the sweep. A reading of at least `farthest` or `no_echo`
+    clears `ray_length`, but no farther than itself and `no_echo`; NaN, -inf, 0 and readings below `nearest`
+    say nothing.
     """
     hits = silent = 0
     cosine, sine = math.cos(base_from_laser[2]), math.sin(base_from_laser[2])
@@ -36,7 +37,7 @@ def beams_to_points(
         if not r > 0.0 or r < nearest:
             continue
         echo = r < farthest and r < no_echo
-        length = r if echo else ray_length
+        length = r if echo else min(r, no_echo, ray_length)
         if length <= 0.0:
             continue
         angle = angle_min + k * increment
@@ -46,11 +47,12 @@ def beams_to_points(
         if time_increment != 0.0:
             t = k * time_increment
             turn = twist[2] * t
-            # the chord of the arc travelled while turning by `turn`
             half = 0.5 * turn
             ct, st = math.cos(turn), math.sin(turn)
             ch, sh = math.cos(half), math.sin(half)
-            mx, my = twist[0] * t, twist[1] * t
+            # the chord of the arc travelled is shorter than the arc, and points halfway
+            chord = t * sh / half if half != 0.0 else t
+            mx, my = twist[0] * chord, twist[1] * chord
             bx, by = ct * bx - st * by + ch * mx - sh * my, st * bx + ct * by + sh * mx + ch * my
         if echo:
             points[hits, 0], points[hits, 1] = bx, by
