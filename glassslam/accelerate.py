@@ -20,9 +20,14 @@ def _writable(folder: Path) -> bool:
 
 
 def _fingerprint() -> str:
-    """Digest of the generated kernels: numba would not notice that one its cached callers inlined changed."""
-    generated = sorted(Path(__file__).parent.glob("*/_generated.py"))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in generated)).hexdigest()[:12]
+    """Digest of all kernels: numba would not notice that one its cached callers inlined has changed."""
+    package = Path(__file__).parent
+    sources = [
+        *package.glob("*/*kernels.py"),
+        *package.glob("*/_generated.py"),
+        package / "posegraph" / "storage.py",
+    ]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(sources))).hexdigest()[:12]
 
 
 def _choose_cache_folder() -> None:

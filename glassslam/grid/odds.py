@@ -42,7 +42,7 @@ class OddsModel:
     Examples
     --------
     >>> model = OddsModel(hit_probability=0.55)
-    >>> float(model.table()[model.prior + model.hit_step].round(3))
+    >>> round(float(model.table()[model.prior + model.hit_step]), 3)
     0.55
     """
 

@@ -54,8 +54,8 @@ class BranchAndBoundMatcher:
     Examples
     --------
     >>> import numpy as np
-    >>> wall = np.stack((np.linspace(-2, 2, 200), np.full(200, 1.5)), axis=1)
-    >>> corner = np.concatenate((wall, np.stack((np.full(100, 2.0), np.linspace(-1, 1.5, 100)), axis=1)))
+    >>> wall = np.stack((np.linspace(-2, 2, 200), np.full(200, 1.52)), axis=1)
+    >>> corner = np.concatenate((wall, np.stack((np.full(100, 2.02), np.linspace(-1, 1.5, 100)), axis=1)))
     >>> grid = ProbabilityGrid(0.05)
     >>> for _ in range(20):
     ...     grid.insert(np.zeros(2), corner, np.empty((0, 2)))

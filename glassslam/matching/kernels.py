@@ -140,14 +140,15 @@ def newton_step(
     prior: FloatArray,
     away: FloatArray,
     damping: float,
+    system: FloatArray,
     step: FloatArray,
 ) -> bool:
-    """Damped Newton step at a pose `away` from the prediction; False when there is none.
+    """Damped Newton step at a pose `away` from the prediction and its system; False when there is none.
 
     Where the exact Hessian is not positive definite, or its step is long, the Gauss-Newton one
     with more damping takes its place: far from the best pose the surface curves the wrong way.
     """
-    system, right, scale = np.empty((3, 3)), np.empty(3), np.empty(3)
+    right, scale = np.empty(3), np.empty(3)
     for a in range(3):
         right[a] = -weight * gradient[a] - prior[a] * away[a]
         scale[a] = weight * hessian[a, a] + prior[a]
@@ -184,7 +185,7 @@ def align(
     information of the match alone (weight * J^T J at the pose); returns (cost, iterations). Ends where a
     step is shorter than `tolerance` (m, and about a third of it in rad) or saves less than that share.
     """
-    trial, step = np.empty(3), np.empty(3)
+    trial, step, system = np.empty(3), np.empty(3), np.empty((3, 3))
     hessian, curvature, gradient = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     new_hessian, new_curvature, new_gradient = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     pose[:] = prediction
@@ -196,7 +197,7 @@ def align(
     while iterations < max_iterations and damping < LARGEST_DAMPING:
         iterations += 1
         away = pose - prediction
-        if not newton_step(hessian, curvature, gradient, weight, prior, away, damping, step):
+        if not newton_step(hessian, curvature, gradient, weight, prior, away, damping, system, step):
             damping = max(4.0 * damping, FIRST_DAMPING)
             continue
         trial[:] = pose + step
@@ -232,19 +233,11 @@ def objective(
     pose: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Cost of a pose as in `align`, its gradient (3) and Hessian (9) into `out`.
-
-    The Hessian is the exact one where that is positive definite, the Gauss-Newton one elsewhere.
-    """
-    hessian, curvature, gradient = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    """Cost of a pose as in `align`, its gradient (3) and the Hessian `newton_step` takes (9) into `out`."""
+    hessian, curvature, system = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    gradient, away = np.empty(3), pose - prediction
     cost = linearise(cells, table, origin, inverse_resolution, points, pose, hessian, curvature, gradient)
     out[0] = weight * cost + prior_cost(pose, prediction, prior)
-    for a in range(3):
-        out[1 + a] = 2.0 * (weight * gradient[a] + prior[a] * (pose[a] - prediction[a]))
-        for b in range(3):
-            hessian[a, b] *= weight
-            curvature[a, b] = hessian[a, b] + weight * curvature[a, b]
-        hessian[a, a] += prior[a] + LEAST_CURVATURE
-        curvature[a, a] += prior[a]
-    exact = solve_symmetric(curvature, gradient, np.empty(3))
-    out[4:] = 2.0 * (curvature if exact else hessian).ravel()
+    out[1:4] = 2.0 * (weight * gradient + prior * away)
+    newton_step(hessian, curvature, gradient, weight, prior, away, 0.0, system, np.empty(3))
+    out[4:] = 2.0 * system.ravel()

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from glassslam.errors import GraphError
 from glassslam.posegraph import covariance_kernels
 from glassslam.posegraph.structure_kernels import Integers
 from glassslam.posegraph.system import System
@@ -30,12 +29,3 @@ def relative_covariances(system: System, poses: FloatArray, pairs: Integers) -> 
     apart = s.component[pairs[:, 0]] != s.component[pairs[:, 1]]
     out[apart] = np.diag(np.full(3, np.inf))
     return out
-
-
-def chi_square_limit(probability: float, degrees: int = 3) -> float:
-    """Squared Mahalanobis length a good measurement stays below with this probability."""
-    from scipy.special import gammaincinv  # noqa: PLC0415
-
-    if not 0.0 < probability < 1.0:
-        raise GraphError(f"probability {probability} of a test", "it must lie between 0 and 1")
-    return float(2.0 * gammaincinv(0.5 * degrees, probability))

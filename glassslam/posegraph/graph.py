@@ -5,7 +5,7 @@ from typing import Literal, TypeAlias
 
 from glassslam.records import FloatArray
 
-ConstraintKind: TypeAlias = Literal["intra", "loop", "odometry"]
+ConstraintKind: TypeAlias = Literal["loop", "odometry"]
 Loss: TypeAlias = Literal["none", "huber", "geman_mcclure"]
 Solver: TypeAlias = Literal["lm", "casadi"]
 
@@ -22,8 +22,8 @@ class Constraint:
         Measured pose of b in the frame of a, m and rad.
     sqrt_information : ndarray of float64, shape (3, 3)
         W with information = W^T W; the weighted residual is W e.
-    kind : {"intra", "loop", "odometry"}
-        A scan in the submap it was inserted in; a loop closure (robust loss); odometry between nodes.
+    kind : {"loop", "odometry"}
+        A loop closure (robust loss), or the step between consecutive nodes.
     """
 
     a: int

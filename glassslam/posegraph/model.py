@@ -15,7 +15,7 @@ def wrapped(angle: ca.SX) -> ca.SX:
 
 
 def between_error(a: ca.SX, b: ca.SX, a_from_b: ca.SX) -> ca.SX:
-    """Measured minus predicted pose of b in the frame of a (METHODS.md, section 0), angle wrapped."""
+    """Measured minus predicted pose of b in the frame of a (Hess et al. 2016, section V-A), angle wrapped."""
     c, s = ca.cos(a[2]), ca.sin(a[2])
     dx, dy = b[0] - a[0], b[1] - a[1]
     predicted = ca.vertcat(c * dx + s * dy, c * dy - s * dx)

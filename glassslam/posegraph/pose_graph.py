@@ -118,7 +118,7 @@ class PoseGraph:
             Measured poses of b in the frame of a, m and rad.
         sqrt_information : array_like, shape (k, 3, 3) or (3, 3)
             W with information = W^T W.
-        kind : {"intra", "loop", "odometry"}
+        kind : {"loop", "odometry"}
             Kind of all of them.
 
         Raises

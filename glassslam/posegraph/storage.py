@@ -10,7 +10,7 @@ from glassslam.errors import GraphError
 from glassslam.posegraph.graph import Constraint, ConstraintKind
 from glassslam.records import FloatArray
 
-KINDS: tuple[ConstraintKind, ...] = ("intra", "loop", "odometry")
+KINDS: tuple[ConstraintKind, ...] = ("loop", "odometry")
 LOOP = KINDS.index("loop")
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)

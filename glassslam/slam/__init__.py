@@ -1,0 +1,1 @@
+"""SLAM: local tracking, loop closing, and the mapper that joins them."""

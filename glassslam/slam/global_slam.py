@@ -13,7 +13,7 @@ from glassslam.posegraph import PoseGraph
 from glassslam.posegraph.consistency import prune_closures
 from glassslam.posegraph.storage import LOOP
 from glassslam.records import FloatArray
-from glassslam.slam.closure import Closure
+from glassslam.slam.closure import Candidate, Closure
 from glassslam.slam.loop_closing import LoopSearcher, select
 from glassslam.slam.node import Node
 from glassslam.slam.stopwatch import Stages
@@ -146,7 +146,7 @@ class GlobalSlam:
             )
 
     def _search(
-        self, candidates: Sequence, nodes: list[Node], travel: FloatArray, submaps: list[Submap]
+        self, candidates: Sequence[Candidate], nodes: list[Node], travel: FloatArray, submaps: list[Submap]
     ) -> list[Closure]:
         with self._stages.measure("loop closing"):
             return self._searcher.search(candidates, nodes, travel, submaps)

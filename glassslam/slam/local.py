@@ -131,7 +131,7 @@ class LocalSlam:
     def _match_near(
         self, grid: ProbabilityGrid, points: FloatArray, prediction: Prediction, start: FloatArray
     ) -> MatchResult:
-        """Gradient match whose prior weighs less the more the robot moved (odometry errors grow with motion)."""
+        """Gradient match whose prior weighs less the more the robot moved, as odometry errs by the way."""
         local = self._config.local
         trust = 1.0 if prediction.measured else _COASTING_SHARE
         return match_scan(

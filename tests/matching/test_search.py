@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matching_worlds import NOTHING, apart, mapped, random_grid, scan_from
+from matching_worlds import NOTHING, apart, mapped, naive_residuals, random_grid, scan_from
 
 from glassslam.geometry import transform_points
 from glassslam.grid import ProbabilityGrid
@@ -237,7 +237,7 @@ def naive_exhaustive(grid, points, guess, steps, turns, turn, costs):
         hit = np.floor(moved / grid.resolution).astype(int)
         for dx, dy in itertools.product(range(-steps, steps + 1), repeat=2):
             total = 0.0
-            for c, r in hit + [dx, dy]:
+            for c, r in np.add(hit, (dx, dy)):
                 if 0 <= r < grid.cells.shape[0] and 0 <= c < grid.cells.shape[1] and grid.cells[r, c]:
                     total += float(grid.table[grid.cells[r, c]])
             cost = costs[0] * math.hypot(dx, dy) * grid.resolution + costs[1] * abs(a * turn)
@@ -283,20 +283,30 @@ def test_without_points_nearby_the_guess_stays(points):
     assert search_around(mapped(), points, TRUE, 0.2, 0.3).tolist() == TRUE.tolist()
 
 
-def slides(grid, points, direction):
+def slides(grid, points, direction, limit=0.3, reach=3.0):
     """How far the scan may slide from the middle of the grid."""
-    return flat_reach(
-        grid.cells, grid.table, grid.origin, 1 / grid.resolution, points, np.zeros(3), np.array(direction), 0.4,
-        3.0, 0.1,
-    )  # fmt: skip
+    place = (grid.cells, grid.table, grid.origin, 1 / grid.resolution)
+    return flat_reach(*place, points, np.zeros(3), np.array(direction), limit, reach, 0.1)
 
 
 def test_a_scan_slides_along_a_corridor_but_not_across():
     points = scan_from(np.zeros(3), walls=[((-3, -1), (3, -1)), ((-3, 1), (3, 1))])
     grid = mapped(corridor=True)
-    assert slides(grid, points, (1.0, 0.0)) == pytest.approx(3.0)
+    assert slides(grid, points, (1.0, 0.0), reach=2.0) == pytest.approx(2.0)
     assert slides(grid, points, (0.0, 1.0)) == 0.0
 
 
 def test_a_scan_does_not_slide_in_a_room():
     assert slides(mapped(), scan_from(np.zeros(3)), (1.0, 0.0)) <= 0.1
+
+
+@pytest.mark.parametrize("limit", [0.1, 0.3, 0.4, 0.5])
+def test_the_reach_is_the_farthest_shift_that_fits(limit):
+    grid, points = mapped(corridor=True), scan_from(np.zeros(3), 24)
+    fits = [
+        0.1 * k
+        for k in range(1, 16)
+        for sign in (-1, 1)
+        if np.sqrt((naive_residuals(grid, points, [0.0, sign * 0.1 * k, 0.0]) ** 2).mean()) < limit
+    ]
+    assert slides(grid, points, (0.0, 1.0), limit, 1.5) == pytest.approx(max(fits, default=0.0))

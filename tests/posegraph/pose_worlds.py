@@ -14,7 +14,7 @@ def wrap(angle):
 
 
 def naive_error(a, b, z):
-    """Measured minus (R_a^T (t_b - t_a), theta_b - theta_a), as METHODS.md writes it."""
+    """Measured minus (R_a^T (t_b - t_a), theta_b - theta_a) (Hess et al. 2016, section V-A)."""
     rotation = np.array([[np.cos(a[2]), -np.sin(a[2])], [np.sin(a[2]), np.cos(a[2])]])
     return np.append(z[:2] - rotation.T @ (b[:2] - a[:2]), wrap(z[2] - (b[2] - a[2])))
 

@@ -187,7 +187,7 @@ def test_parts_without_connection_stay_where_they_are(solver):
     graph = line(3)
     alone = graph.add_pose((7.0, 8.0, 1.0))
     first = graph.add_poses([[50.0, 0.0, math.pi / 2], [60.0, 0.0, 0.0]])
-    graph.add_constraint(Constraint(first, first + 1, np.array([1.0, 0.0, 0.0]), WEIGHT, "intra"))
+    graph.add_constraint(Constraint(first, first + 1, np.array([1.0, 0.0, 0.0]), WEIGHT, "odometry"))
     assert graph.optimize(solver=solver).converged
     np.testing.assert_array_equal(graph.poses[alone], [7.0, 8.0, 1.0])
     np.testing.assert_array_equal(graph.poses[first], [50.0, 0.0, math.pi / 2])
@@ -217,8 +217,8 @@ def test_parallel_constraints_add_up():
     graph = PoseGraph()
     graph.add_poses(np.zeros((2, 3)))
     for x, weight in ((1.0, 1.0), (2.0, math.sqrt(3.0))):
-        graph.add_constraint(Constraint(0, 1, np.array([x, 0, 0]), weight * np.eye(3), "intra"))
-    graph.add_constraint(Constraint(1, 0, np.array([-1.75, 0, 0]), np.eye(3), "intra"))
+        graph.add_constraint(Constraint(0, 1, np.array([x, 0, 0]), weight * np.eye(3), "odometry"))
+    graph.add_constraint(Constraint(1, 0, np.array([-1.75, 0, 0]), np.eye(3), "odometry"))
     graph.optimize()
     np.testing.assert_allclose(graph.poses[1], [1.75, 0, 0], atol=1e-8)
 

@@ -1,0 +1,92 @@
+"""What a run counts on its way, and the statistics it ends with."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from glassslam.records import LaserScan
+from glassslam.slam.extrapolator import PoseExtrapolator
+from glassslam.slam.global_slam import GlobalSlam
+from glassslam.slam.local import LocalSlam
+from glassslam.slam.result import RunStatistics
+from glassslam.slam.stopwatch import Stages
+
+_FEW = 0.1
+
+
+@dataclass(slots=True)
+class Tally:
+    """Scans counted one by one.
+
+    Attributes
+    ----------
+    read : int
+        Scans that came in.
+    dropped : Counter
+        Reason -> scans that could not be used.
+    without_odometry : int
+        Scans placed at a time that odometry did not reach.
+    returns : int
+        Returns in all scans placed, after thinning.
+    stamps : list of float
+        Of the scans placed, s.
+    """
+
+    read: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    without_odometry: int = 0
+    returns: int = 0
+    stamps: list[float] = field(default_factory=list)
+
+    def place(self, scan: LaserScan, returns: int, *, with_odometry: bool) -> None:
+        """Count a scan that was given a pose."""
+        self.stamps.append(scan.stamp)
+        self.returns += returns
+        self.without_odometry += not with_odometry
+
+    def excuse(self) -> str:
+        """What came in, for a run that has nothing to show."""
+        dropped = ", ".join(f"{count} x {reason}" for reason, count in sorted(self.dropped.items()))
+        return f"{self.read} scans read; dropped: {dropped or 'none'}"
+
+
+def run_statistics(
+    tally: Tally, extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam, stages: Stages
+) -> RunStatistics:
+    """Everything the report tells of a finished run."""
+    used, taken_out = world.closures()
+    rejected = dict(sorted(world.rejected.items()))
+    if taken_out:
+        rejected["taken out after optimisation"] = taken_out
+    not_finite = extrapolator.odometry.dropped
+    return RunStatistics(
+        scans_read=tally.read,
+        scans_used=len(tally.stamps),
+        scans_dropped=dict(sorted(tally.dropped.items())),
+        messages_dropped={"odometry not finite": not_finite} if not_finite else {},
+        recording_seconds=float(max(tally.stamps) - min(tally.stamps)),
+        stages=dict(sorted(stages.times.items())),
+        nodes=len(world.nodes),
+        submaps=len(world.submaps),
+        closures_tried=world.searches,
+        closures_accepted=used,
+        closures_rejected=rejected,
+        residuals=world.residuals(),
+        warnings=_warnings(tally, extrapolator, local),
+    )
+
+
+def _warnings(tally: Tally, extrapolator: PoseExtrapolator, local: LocalSlam) -> list[str]:
+    used = len(tally.stamps)
+    warnings = []
+    if len(extrapolator.odometry) and tally.without_odometry > _FEW * used:
+        warnings.append(
+            f"odometry does not reach {tally.without_odometry} of {used} scans:"
+            " its stamps may be of another clock"
+        )
+    if extrapolator.jumps:
+        warnings.append(f"odometry jumped {extrapolator.jumps} times; those steps are not used")
+    if local.unmatched:
+        warnings.append(
+            f"{local.unmatched} of {used} scans had too few returns to match: their poses are predictions"
+        )
+    return warnings
