@@ -149,6 +149,33 @@ class MapConfig(GridConfig):
     miss_probability: Annotated[float, Field(gt=0, lt=0.5)] = 0.4
 
 
+class GlassWallConfig(Section):
+    """Walls fitted from glass observations."""
+
+    min_observations: Count = 3
+    """Observations a wall rests on at least."""
+    min_nodes: Count = 2
+    """Different nodes that made them, at least."""
+    min_evidence: Positive = 1.5
+    """Least sum of probabilities around the observation a wall starts from."""
+    min_probability: Probability = 0.9
+    """Least probability of a wall."""
+    min_excess: Positive = 2.0
+    """Least ratio of the observations that fit a wall to those that would by chance, from the strip around it."""
+    distance_tolerance: Positive = 0.12
+    """Largest distance of an observation from its wall, m."""
+    angle_tolerance_deg: Positive = 7.0
+    """Largest angle between an observed normal and that of its wall, deg."""
+    max_gap: Positive = 4.0
+    """Longest stretch bridged between observations, m."""
+    max_mullion: Positive = 0.3
+    """Widest opaque post inside a wall, m."""
+    max_extension: NonNegative = 0.6
+    """Longest stretch from the last observation to the frame that ends a wall, m."""
+    opening_evidence: Positive = 4.0
+    """Answers that glass would have given in a gap, had it been there, from which the gap is an opening."""
+
+
 class Config(Section):
     """Everything that decides a map, apart from the recording itself."""
 

@@ -19,7 +19,7 @@ LARGEST_DAMPING = 1e8
 LEAST_CURVATURE = 1e-9
 """Keeps the directions that neither walls nor prior hold."""
 LONGEST_STEP = 0.1
-"""Farthest the surface is trusted to curve as it does here, m and rad: two cells."""
+"""Farthest the slopes of the surface are trusted, m and rad: two cells."""
 
 
 @kernel
@@ -146,7 +146,8 @@ def newton_step(
     """Damped Newton step at a pose `away` from the prediction and its system; False when there is none.
 
     Where the exact Hessian is not positive definite, or its step is long, the Gauss-Newton one
-    with more damping takes its place: far from the best pose the surface curves the wrong way.
+    with more damping takes its place, cut to the same length: far from the best pose the surface
+    curves the wrong way, and its slope tells nothing of what lies two cells away.
     """
     right, scale = np.empty(3), np.empty(3)
     for a in range(3):
@@ -161,7 +162,12 @@ def newton_step(
         for b in range(3):
             system[a, b] = weight * hessian[a, b]
         system[a, a] = scale[a] * (1.0 + max(damping, FIRST_DAMPING)) + LEAST_CURVATURE
-    return solve_symmetric(system, right, step)
+    solved = solve_symmetric(system, right, step)
+    excess = max(abs(step[0]), abs(step[1]), abs(step[2])) / LONGEST_STEP
+    if solved and excess > 1.0:
+        step /= excess
+        system *= excess
+    return solved
 
 
 @kernel

@@ -51,10 +51,10 @@ def discretise(
 
 @kernel
 def _score(level: Bytes, index: Int32s, a: int, n: int, offset: int) -> int:
-    total = 0
+    total = np.int64(0)
     for k in range(n):
-        total += level[index[a, k] + offset]
-    return total
+        total += np.int64(level[index[a, k] + offset])
+    return int(total)
 
 
 @kernel

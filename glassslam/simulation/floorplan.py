@@ -1,15 +1,17 @@
 """From the floor plan to the line segments a beam can hit."""
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.errors import ConfigError
 from glassslam.records import FloatArray
-from glassslam.simulation.scene import Box, Opening, Post, Scene, Wall
+from glassslam.simulation.scene import Box, Opening, Panes, Post, Scene, Wall
 
 _POST_SIDES = 12
 
@@ -28,12 +30,15 @@ class FloorPlan:
         Names of the materials in use.
     material : ndarray of int64, shape (n,)
         Index of each segment's material in `materials`.
+    lean : ndarray of float64, shape (n,)
+        Angle of each segment's surface with the vertical, rad.
     """
 
     segments: FloatArray
     names: tuple[str, ...]
     materials: tuple[str, ...]
     material: NDArray[np.int64]
+    lean: FloatArray
 
 
 def build_floor_plan(scene: Scene) -> FloorPlan:
@@ -44,21 +49,29 @@ def build_floor_plan(scene: Scene) -> FloorPlan:
     ConfigError
         An opening lies beyond its wall or over another one, or a wall has no length.
     """
-    pieces: list[tuple[str, str, FloatArray]] = []
+    pieces: list[_Piece] = []
     for wall in scene.walls:
-        pieces += [(wall.name, wall.material, outline) for outline in _wall_outlines(wall)]
+        pieces += _wall_pieces(wall)
     for box in scene.boxes:
-        pieces += [(box.name, box.material, outline) for outline in _box_outlines(box)]
+        pieces += [_Piece(box.name, box.material, outline) for outline in _box_outlines(box)]
     for post in scene.posts:
-        pieces += [(post.name, post.material, outline) for outline in _post_outlines(post)]
-    materials = tuple(dict.fromkeys(material for _, material, _ in pieces))
-    counts = [len(outline) for _, _, outline in pieces]
+        pieces += [_Piece(post.name, post.material, outline) for outline in _post_outlines(post)]
+    materials = tuple(dict.fromkeys(piece.material for piece in pieces))
+    counts = [len(piece.outline) for piece in pieces]
     return FloorPlan(
-        segments=np.concatenate([outline for _, _, outline in pieces]),
-        names=tuple(name for (name, _, _), count in zip(pieces, counts, strict=True) for _ in range(count)),
+        segments=np.concatenate([piece.outline for piece in pieces]),
+        names=tuple(piece.name for piece, count in zip(pieces, counts, strict=True) for _ in range(count)),
         materials=materials,
-        material=np.repeat([materials.index(material) for _, material, _ in pieces], counts).astype(np.int64),
+        material=np.repeat([materials.index(piece.material) for piece in pieces], counts).astype(np.int64),
+        lean=np.deg2rad(np.repeat([piece.lean_deg for piece in pieces], counts)),
     )
+
+
+class _Piece(NamedTuple):
+    name: str
+    material: str
+    outline: FloatArray
+    lean_deg: float = 0.0
 
 
 def _ring(corners: FloatArray) -> FloatArray:
@@ -66,7 +79,19 @@ def _ring(corners: FloatArray) -> FloatArray:
     return np.hstack((corners, np.roll(corners, -1, axis=0)))
 
 
-def _wall_outlines(wall: Wall) -> Iterator[FloatArray]:
+def _wall_pieces(wall: Wall) -> Iterator[_Piece]:
+    for origin, direction, span, length in _stretches(wall):
+        if wall.panes is None:
+            outline = _face(origin, direction, _extended(wall, *span, length), wall.thickness)
+            yield _Piece(wall.name, wall.material, outline, wall.lean_deg)
+        else:
+            yield from _pane_pieces(
+                wall, wall.panes, origin + span[0] * direction, direction, span[1] - span[0]
+            )
+
+
+def _stretches(wall: Wall) -> Iterator[tuple[FloatArray, FloatArray, tuple[float, float], float]]:
+    """Straight parts without openings: start and direction of the side, span on it, length of the side."""
     points = np.array(wall.points + wall.points[:1] if wall.closed else wall.points)
     lengths = np.hypot(*np.diff(points, axis=0).T)
     if np.any(lengths == 0.0):
@@ -76,8 +101,44 @@ def _wall_outlines(wall: Wall) -> Iterator[FloatArray]:
     for k, length in enumerate(lengths):
         direction = (points[k + 1] - points[k]) / length
         for begin, end in _solid(gaps, float(starts[k]), float(starts[k + 1])):
-            span = _extended(wall, begin - starts[k], end - starts[k], float(length))
-            yield _face(points[k], direction, span, wall.thickness)
+            yield points[k], direction, (begin - float(starts[k]), end - float(starts[k])), float(length)
+
+
+def _pane_pieces(
+    wall: Wall, panes: Panes, origin: FloatArray, direction: FloatArray, length: float
+) -> Iterator[_Piece]:
+    """Panes of equal width with a mullion at both ends of each."""
+    if length <= 2 * panes.mullion:
+        raise ConfigError(f"wall {wall.name!r}: a stretch of {length:.2f} m has no room for a pane")
+    count = max(1, math.ceil(length / panes.width - 1e-9))
+    joints = np.linspace(panes.mullion / 2, length - panes.mullion / 2, count + 1)
+    for begin, end in itertools.pairwise(joints):
+        span = (begin + panes.mullion / 2, end - panes.mullion / 2)
+        yield _Piece(wall.name, wall.material, _face(origin, direction, span, 0.0), wall.lean_deg)
+    for joint in joints:
+        yield _Piece(
+            f"{wall.name}-mullions", panes.material, _mullion(panes, origin + joint * direction, direction)
+        )
+
+
+def _mullion(panes: Panes, centre: FloatArray, direction: FloatArray) -> FloatArray:
+    """Bar with cut corners: one of its faces looks nearly at the lidar from most places."""
+    a, b = panes.mullion / 2, panes.depth / 2
+    cut = 0.35 * min(a, b)
+    corners = np.array(
+        [
+            [a - cut, -b],
+            [a, cut - b],
+            [a, b - cut],
+            [a - cut, b],
+            [cut - a, b],
+            [-a, b - cut],
+            [-a, cut - b],
+            [cut - a, -b],
+        ]
+    )
+    rotation = np.array([[direction[0], -direction[1]], [direction[1], direction[0]]])
+    return _ring(corners @ rotation.T + centre)
 
 
 def _gaps(wall: Wall, total: float) -> list[tuple[float, float]]:

@@ -1,46 +1,16 @@
 """A simulated world as written down: floor plan, materials, robot path and odometry."""
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from glassslam.cards import datasets_folder
 from glassslam.errors import ConfigError
+from glassslam.simulation.materials import MATERIALS, Finite, Material, NonNegative, Part, Positive
 from glassslam.yamlmodel import load_yaml_model
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
-
-
-class Part(BaseModel):
-    """One frozen piece of a scene; unknown names are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Material(Part):
-    """How a surface answers a laser beam."""
-
-    kind: Literal["diffuse"] = "diffuse"
-    """Law of reflection; a diffuse surface scatters evenly (Lambert)."""
-    reflectance: Annotated[float, Field(gt=0, le=1)]
-    """Share of the light that is scattered back, 1 = white paper."""
-
-
-MATERIALS = {
-    "plaster": Material(reflectance=0.85),
-    "concrete": Material(reflectance=0.45),
-    "brick": Material(reflectance=0.35),
-    "wood": Material(reflectance=0.55),
-    "painted_metal": Material(reflectance=0.6),
-    "cardboard": Material(reflectance=0.65),
-    "fabric": Material(reflectance=0.3),
-    "black_plastic": Material(reflectance=0.08),
-}
-"""Materials every scene knows; a scene may add its own or redefine these."""
 
 
 class Opening(Part):
@@ -50,6 +20,18 @@ class Opening(Part):
     """Distance of the nearer jamb from the first point, along the line, m."""
     width: Positive
     """Clear width, m."""
+
+
+class Panes(Part):
+    """How a line of glass is divided: panes of equal width between mullions."""
+
+    width: Positive = 1.2
+    """Widest pane, mullion included, m."""
+    mullion: Positive = 0.06
+    """Width of a mullion along the line, m."""
+    depth: Positive = 0.1
+    """Depth of a mullion across the line, m; its corners are cut."""
+    material: str = "aluminium"
 
 
 class Wall(Part):
@@ -62,6 +44,16 @@ class Wall(Part):
     thickness: NonNegative = 0.0
     """Both faces are drawn this far apart, m; 0 draws the line itself."""
     openings: tuple[Opening, ...] = ()
+    panes: Panes | None = None
+    """Given: the stretches between openings and corners are divided by mullions."""
+    lean_deg: Finite = 0.0
+    """Angle with the vertical, deg; panes that lean send their glint over or under the lidar."""
+
+    @model_validator(mode="after")
+    def _panes_are_thin(self) -> Self:
+        if self.panes is not None and self.thickness > 0.0:
+            raise ValueError(f"wall {self.name!r}: panes have no thickness")
+        return self
 
 
 class Box(Part):
@@ -84,6 +76,22 @@ class Post(Part):
     radius: Positive
     at: Annotated[tuple[Point, ...], Field(min_length=1)]
     """Centre of each."""
+
+
+class Person(Part):
+    """Somebody who walks to and fro: two legs, seen as moving circles."""
+
+    name: str
+    points: Annotated[tuple[Point, ...], Field(min_length=2)]
+    """The line walked, from one end to the other and back, for ever."""
+    speed: Positive = 1.2
+    """Walking speed, m/s."""
+    start: Finite = 0.0
+    """Place on the line at the first moment, m along the way there and back."""
+    leg_radius: Positive = 0.06
+    stance: Positive = 0.2
+    """Distance between the legs across the line, m."""
+    material: str = "fabric"
 
 
 class Waypoint(Part):
@@ -143,12 +151,15 @@ class Scene(Part):
     """Lidar carried unless another is asked for."""
     laser_pose: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Pose of the laser on the robot base: x m, y m, yaw rad."""
+    scan_rate: Positive | None = None
+    """Scans recorded per second, at most those of the lidar; all when omitted."""
     start_time: NonNegative = 1_500_000_000.0
     """Stamp of the first moment, s since 1970."""
-    materials: dict[str, Material] = {}
+    materials: dict[str, Material] = Field(default_factory=dict)
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
     posts: tuple[Post, ...] = ()
+    people: tuple[Person, ...] = ()
     drive: Drive
     odometry: OdometryModel = OdometryModel()
 
@@ -156,11 +167,13 @@ class Scene(Part):
     def _materials_known(self) -> Self:
         if not (self.walls or self.boxes or self.posts):
             raise ValueError("nothing to see: give walls, boxes or posts")
-        things: list[Wall | Box | Post] = [*self.walls, *self.boxes, *self.posts]
-        for thing in things:
-            if thing.material not in self.palette():
+        things: list[Wall | Box | Post | Person] = [*self.walls, *self.boxes, *self.posts, *self.people]
+        used = [(thing.name, thing.material) for thing in things]
+        used += [(wall.name, wall.panes.material) for wall in self.walls if wall.panes is not None]
+        for name, material in used:
+            if material not in self.palette():
                 known = ", ".join(self.palette())
-                raise ValueError(f"{thing.name!r} is made of unknown {thing.material!r} (known: {known})")
+                raise ValueError(f"{name!r} is made of unknown {material!r} (known: {known})")
         return self
 
     def palette(self) -> dict[str, Material]:

@@ -1,19 +1,20 @@
 """A recording that was never made: scans and odometry of a robot in a scene, and the truth."""
 
 import heapq
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glassslam.errors import ConfigError
+from glassslam.errors import ConfigError, UsageError
 from glassslam.geometry import compose, wrap_angle
 from glassslam.records import Float32Array, FloatArray, LaserScan, Record, Trajectory
 from glassslam.simulation.drive import Motion, drive_path
-from glassslam.simulation.echo import echoes
+from glassslam.simulation.echo import Observation, Optics
 from glassslam.simulation.floorplan import FloorPlan, build_floor_plan
 from glassslam.simulation.odometry import odometry_records
-from glassslam.simulation.raycast import SegmentGrid, clearance
+from glassslam.simulation.people import Crowd, feet
+from glassslam.simulation.raycast import clearance
 from glassslam.simulation.scene import Scene
 from glassslam.simulation.sensors import LidarModel, lidar
 
@@ -50,26 +51,31 @@ class Simulation:
         """Length of the path, m."""
         return float(np.hypot(*np.diff(self.motion.poses[:, :2], axis=0).T).sum())
 
-    def records(self) -> Iterator[Record]:
-        """Scans and odometry in the order in which they would be recorded."""
+    def records(self, watch: Callable[[Observation], None] | None = None) -> Iterator[Record]:
+        """Scans and odometry in the order in which they would be recorded.
+
+        Parameters
+        ----------
+        watch : callable, optional
+            Called with the truth of every scan, in the order of `truth`, before the scan is given out.
+        """
         scene = self.scene
         odometry = odometry_records(self.motion, scene.odometry, self.seed, scene.start_time)
-        return heapq.merge(odometry, self._scans(), key=lambda record: record.record_stamp)
+        return heapq.merge(odometry, self._scans(watch), key=lambda record: record.record_stamp)
 
-    def _scans(self) -> Iterator[LaserScan]:
+    def _scans(self, watch: Callable[[Observation], None] | None) -> Iterator[LaserScan]:
         sensor, random = self.sensor, np.random.default_rng([self.seed, 0])
-        grid = SegmentGrid.build(self.plan.segments)
-        palette = self.scene.palette()
-        reflectance = np.array([palette[self.plan.materials[m]].reflectance for m in self.plan.material])
-        beam = np.arange(sensor.beams)
-        bearing = sensor.angle_min + beam * sensor.angle_increment
+        optics = Optics.build(self.plan, self.scene.palette(), sensor)
+        crowd = Crowd.of(self.scene)
+        instants = np.arange(sensor.beams, dtype=np.float64) * sensor.time_increment
         for stamp in self.truth.stamps:
+            time = float(stamp) - self.scene.start_time
             # Every beam leaves from where the laser is at its own instant: that is motion distortion.
-            base = self.motion.at(stamp - self.scene.start_time + beam * sensor.time_increment)
-            laser = compose(base, np.array(self.scene.laser_pose))
-            hits = grid.cast(laser[:, :2], laser[:, 2] + bearing)
-            ranges, intensities = echoes(hits, reflectance[hits.segment], sensor, random)
-            yield self._scan(float(stamp), ranges, intensities)
+            lasers = compose(self.motion.at(time + instants), np.array(self.scene.laser_pose))
+            seen = optics.observe(lasers, crowd.legs(time, max(sensor.sweep, 1e-3)), random)
+            if watch is not None:
+                watch(seen)
+            yield self._scan(float(stamp), seen.ranges, seen.intensities)
 
     def _scan(self, stamp: float, ranges: Float32Array, intensities: Float32Array) -> LaserScan:
         sensor = self.sensor
@@ -87,7 +93,9 @@ class Simulation:
         )
 
 
-def simulate(scene: Scene, sensor: str | LidarModel | None = None, seed: int = 0) -> Simulation:
+def simulate(
+    scene: Scene, sensor: str | LidarModel | None = None, seed: int = 0, scan_rate: float | None = None
+) -> Simulation:
     """Drive the robot of a scene and prepare its recording.
 
     Parameters
@@ -98,19 +106,36 @@ def simulate(scene: Scene, sensor: str | LidarModel | None = None, seed: int = 0
         The lidar or its name; the scene's own when omitted.
     seed : int
         Seed of all noise.
+    scan_rate : float, optional
+        Scans recorded per second; the scene's own, or all of the lidar, when omitted.
 
     Raises
     ------
     UsageError
-        There is no such lidar.
+        There is no such lidar, or it does not turn that fast.
     ConfigError
         The floor plan is contradictory, or the robot would run into something.
     """
     model = sensor if isinstance(sensor, LidarModel) else lidar(sensor or scene.sensor)
+    model = _thinned(model, scan_rate, scene.scan_rate)
     plan = build_floor_plan(scene)
     motion = drive_path(scene.drive)
     _check_clear(scene, plan, motion)
+    _check_people(scene, motion)
     return Simulation(scene, model, seed, motion, plan, _truth(scene, model, motion))
+
+
+def _thinned(model: LidarModel, asked: float | None, of_scene: float | None) -> LidarModel:
+    """The lidar with fewer scans published; a scene's own rate is a limit, one asked for must be met."""
+    rate = asked if asked is not None else of_scene
+    if rate is None or (asked is None and rate * model.scan_period >= 1.0):
+        return model
+    if not rate > 0.0 or rate * model.scan_period > 1.0 + 1e-9:
+        raise UsageError(
+            f"a {model.name} does not give {rate:g} scans per second",
+            f"choose a rate above 0, at most {1 / model.scan_period:g}",
+        )
+    return replace(model, scan_period=1.0 / rate)
 
 
 def _truth(scene: Scene, sensor: LidarModel, motion: Motion) -> Trajectory:
@@ -134,3 +159,20 @@ def _check_clear(scene: Scene, plan: FloorPlan, motion: Motion) -> None:
             f"drive: the robot comes within {distances[worst]:.2f} m of something at ({x:.2f}, {y:.2f})",
             f"move a way point; its radius is {scene.drive.radius:g} m",
         )
+
+
+def _check_people(scene: Scene, motion: Motion) -> None:
+    """Nobody walks through the robot: its laser would stand inside a leg."""
+    if not scene.people:
+        return
+    radii = np.repeat([person.leg_radius for person in scene.people], 2)
+    every = round(0.1 / float(motion.times[1]))
+    for time, pose in zip(motion.times[::every], motion.poses[::every], strict=True):
+        gaps = np.hypot(*(feet(scene.people, float(time)) - pose[:2]).T) - radii
+        nearest = int(np.argmin(gaps))
+        if gaps[nearest] < scene.drive.radius:
+            name = scene.people[nearest // 2].name
+            raise ConfigError(
+                f"people: {name!r} walks into the robot after {time:.1f} s at ({pose[0]:.2f}, {pose[1]:.2f})",
+                "move the line walked, or change `start`",
+            )

@@ -144,6 +144,7 @@ class LocalSlam:
             / math.sqrt(prediction.distance + _CALM_DISTANCE),
             rotation_weight=trust * local.rotation_weight / math.sqrt(prediction.rotation + _CALM_ROTATION),
             max_iterations=local.max_num_iterations,
+            solver=local.solver,
         )
 
     def _is_doubtful(self, match: MatchResult, prediction: Prediction) -> bool:
@@ -201,6 +202,7 @@ class LocalSlam:
             translation_weight=_WEAK_WEIGHT,
             rotation_weight=_WEAK_WEIGHT,
             max_iterations=local.max_num_iterations,
+            solver=local.solver,
         )
 
 

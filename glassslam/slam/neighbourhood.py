@@ -43,7 +43,7 @@ def _at_most(points: FloatArray, count: int) -> FloatArray:
 
 
 def neighbours(travel: FloatArray, index: int, reach: float) -> list[int]:
-    """Nodes within `reach` of travel (m) of a node, at most nine, itself among them.
+    """Nodes within `reach` of travel (m) of a node: the node itself and at most nine, spread evenly.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def step_of(
     right = -weight * gradient - np.array(prior) * away
     arrays = (hessian, curvature, gradient)
     assert newton_step(*arrays, weight, np.array(prior), np.array(away), damping, system, step)
-    np.testing.assert_allclose(system @ step, right, atol=1e-9)
+    np.testing.assert_allclose(system @ step, right, rtol=1e-6, atol=1e-8)
     return step
 
 
@@ -107,6 +107,18 @@ def test_a_long_step_is_not_trusted(axis):
     np.testing.assert_allclose(
         step_of(hessian, curvature, gradient), gauss_newton(hessian, gradient), rtol=1e-6
     )
+
+
+@given(matrices, matrices, vectors, vectors, st.floats(0, 10))
+def test_no_step_is_longer_than_the_surface_is_trusted(a, b, gradient, away, damping):
+    step = step_of(a @ a.T, b + b.T, 1e3 * gradient, damping, away)
+    assert np.abs(step).max() <= LONGEST_STEP * (1 + 1e-9)
+
+
+def test_a_long_way_is_gone_in_its_direction():
+    hessian, gradient = np.diag([4.0, 5.0, 6.0]), np.array([30.0, -10.0, 1.0])
+    step, whole = step_of(hessian, np.zeros((3, 3)), gradient), gauss_newton(hessian, gradient)
+    np.testing.assert_allclose(step, whole * LONGEST_STEP / np.abs(whole).max(), rtol=1e-6)
 
 
 def aligned(grid, points, prediction, prior=(0.0, 0.0, 0.0), weight=1.0, tolerance=1e-9, iterations=100):
@@ -327,7 +339,8 @@ def test_the_objective_of_the_solver_is_the_cost_and_its_derivatives(seed, pose)
         linearise(*place, points, pose, *parts, np.empty(3))
         gauss_newton = 2 * (0.2 * parts[0] + np.diag(PRIOR))
         damped = gauss_newton + FIRST_DAMPING * np.diag(np.diag(gauss_newton))
-        np.testing.assert_allclose(hessian, damped, atol=1e-6)
+        excess = np.abs(np.linalg.solve(damped, out[1:4])).max() / LONGEST_STEP
+        np.testing.assert_allclose(hessian, damped * max(excess, 1.0), atol=1e-6, rtol=1e-6)
 
 
 def test_an_unknown_solver_is_refused():

@@ -1,11 +1,12 @@
 """Tiny worlds a simulated lidar looks at, and runs through them."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 
 from glassslam.config import Config
-from glassslam.geometry import compose
+from glassslam.geometry import between, compose
 from glassslam.records import LaserScan, Odometry
 from glassslam.simulation.raycast import SegmentGrid
 from glassslam.slam.extrapolator import Prediction
@@ -43,10 +44,7 @@ RING = np.vstack(
 
 
 class Lidar:
-    """A lidar that sees a world of segments.
-
-    `rate` turns the base during the sweep when `time_increment` is given: motion distortion.
-    """
+    """A lidar that sees a world of segments all around."""
 
     def __init__(self, world, *, beams=360, noise=0.01, seed=0, reach=30.0):
         self._grid = SegmentGrid.build(world)
@@ -76,7 +74,7 @@ def drive(*corners, step=0.05):
     """Poses along straight lines between corners, turning on the spot by at most 6 deg per scan."""
     points = np.array(corners, dtype=np.float64)
     poses, heading = [], None
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in itertools.pairwise(points):
         along = b - a
         goal = np.arctan2(along[1], along[0])
         if heading is not None:
@@ -99,20 +97,13 @@ def round_trip(turns=1.15):
 
 def odometry(poses, *, scale=1.0, drift=0.0):
     """What wheels make of true poses: lengths off by a factor, headings off by rad per metre."""
-    steps = compose_steps(poses)
+    steps = between(poses[:-1], poses[1:])
     length = np.hypot(steps[:, 0], steps[:, 1])
     out = [np.zeros(3)]
     for step, metres in zip(steps, length, strict=True):
         wrong = np.array([step[0] * scale, step[1] * scale, step[2] + drift * metres])
         out.append(compose(out[-1], wrong))
     return np.array(out)
-
-
-def compose_steps(poses):
-    """Relative poses between consecutive poses."""
-    from glassslam.geometry import between
-
-    return between(poses[:-1], poses[1:])
 
 
 def recording(world, poses, wheels=None, *, period=0.1, seed=0, beams=360, start=100.0):
@@ -140,6 +131,4 @@ def prediction(pose, **changes):
 
 def in_first_frame(poses):
     """Poses seen from the first one, as a mapper that starts at zero estimates them."""
-    from glassslam.geometry import between
-
     return between(poses[0], poses)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from glassslam.geometry import interpolate
@@ -72,7 +72,7 @@ class TestOdometryTrack:
 
     def test_at_a_stamp_it_is_the_pose_itself(self):
         track = track_of((1.0, 0.1, 0.2, 0.3), (2.0, 0.4, 0.5, 0.6))
-        np.testing.assert_array_equal(track.pose_at(1.0), [0.1, 0.2, 0.3])
+        np.testing.assert_allclose(track.pose_at(1.0), [0.1, 0.2, 0.3])
         np.testing.assert_array_equal(track.pose_at(2.0), [0.4, 0.5, 0.6])
         assert track.latest == 2.0
         np.testing.assert_array_equal(track.latest_pose, [0.4, 0.5, 0.6])
@@ -140,8 +140,7 @@ class TestOdometryTrack:
         for t in times:
             mend_late_stamps(kept, t)
             kept.append(t)
-        if stamp >= kept[-1]:
-            return  # extrapolated, see above
+        assume(stamp < kept[-1])  # extrapolated otherwise, see above
         expected = None
         for k in range(len(kept) - 2, -1, -1):
             if kept[k] <= stamp < kept[k + 1]:

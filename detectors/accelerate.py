@@ -1,0 +1,45 @@
+"""How the detectors compile their kernels: nopython, without the GIL, cached on disk where one can write."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _cache_folder() -> str:
+    """Folder of compiled kernels: what the user set, else the user's cache, else a temporary one."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR", "")
+    if chosen and _writable(Path(chosen)):
+        return chosen
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser() / ".cache")
+    base = user / "glassslam" / "numba"
+    fallback = Path(tempfile.gettempdir()) / f"glassslam-numba-{os.getuid()}"
+    return str((base if _writable(base) else fallback) / "detectors")
+
+
+_FOLDER = _cache_folder()
+
+
+def kernel(function: _F) -> _F:
+    """Compile `function` in nopython mode with numpy error semantics, without the GIL, cached."""
+    # numba reads the folder when a function is decorated; restored, so that no other package is affected
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _FOLDER
+    try:
+        return cast(_F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = before

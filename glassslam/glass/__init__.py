@@ -1,0 +1,1 @@
+"""Glass: observations bound to nodes, walls fitted from them, cells locked in the map."""

@@ -1,0 +1,100 @@
+"""Straight lines through oriented surface pieces."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glassslam.records import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A straight line with its uncertainty.
+
+    Attributes
+    ----------
+    foot : ndarray of float64, shape (2,)
+        Weighted mean of the pieces, m.
+    angle : float
+        Direction of the line, rad.
+    position_sigma : float
+        Standard deviation across the line at the foot, m.
+    angle_sigma : float
+        Standard deviation of the direction, rad.
+    """
+
+    foot: FloatArray
+    angle: float
+    position_sigma: float
+    angle_sigma: float
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector along the line, shape (2,)."""
+        return np.array([math.cos(self.angle), math.sin(self.angle)])
+
+    @property
+    def across(self) -> FloatArray:
+        """Unit vector across the line, shape (2,)."""
+        return np.array([-math.sin(self.angle), math.cos(self.angle)])
+
+    def along(self, points: FloatArray) -> FloatArray:
+        """Position of points (n, 2) along the line from the foot, m."""
+        return np.asarray((points - self.foot) @ self.direction)
+
+    def gap(self, points: FloatArray) -> FloatArray:
+        """Signed distance of points (n, 2) from the line, m."""
+        return np.asarray((points - self.foot) @ self.across)
+
+
+def axial_difference(a: FloatArray | float, b: FloatArray | float) -> FloatArray:
+    """Angle between undirected lines, in [0, pi / 2], rad."""
+    return np.abs((np.asarray(a) - np.asarray(b) + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
+
+
+def fit_line(
+    positions: FloatArray, normals: FloatArray, position_sigma: FloatArray, normal_sigma: FloatArray
+) -> Line:
+    """Line of least squares through pieces whose positions and normals both carry information.
+
+    The spread of the positions tells the direction of a long wall; the normals tell that of a short
+    one. Both estimates are joined by their variances.
+
+    Parameters
+    ----------
+    positions : ndarray of float64, shape (n, 2)
+        Points on the surface, m.
+    normals : ndarray of float64, shape (n,)
+        Directions of the surface normal, rad.
+    position_sigma, normal_sigma : ndarray of float64, shape (n,)
+        Standard deviations, m and rad.
+    """
+    weights = 1.0 / position_sigma**2
+    foot = weights @ positions / weights.sum()
+    by_normals, normal_variance = _mean_axis(normals + 0.5 * np.pi, 1.0 / normal_sigma**2)
+    offsets = positions - foot
+    along = offsets @ np.array([math.cos(by_normals), math.sin(by_normals)])
+    across = offsets @ np.array([-math.sin(by_normals), math.cos(by_normals)])
+    spread = float(weights @ along**2)
+    slope = float(weights @ (along * across)) / spread if spread > 0 else 0.0
+    slope_information = spread
+    share = slope_information / (slope_information + 1.0 / normal_variance)
+    angle = by_normals + share * math.atan(slope)
+    angle_variance = 1.0 / (slope_information + 1.0 / normal_variance)
+    return Line(foot, angle, float(1.0 / math.sqrt(weights.sum())), math.sqrt(angle_variance))
+
+
+def _mean_axis(angles: FloatArray, weights: FloatArray) -> tuple[float, float]:
+    """Weighted mean of undirected angles and its variance."""
+    c, s = float(weights @ np.cos(2.0 * angles)), float(weights @ np.sin(2.0 * angles))
+    return 0.5 * math.atan2(s, c), float(1.0 / weights.sum())
+
+
+def members(
+    line: Line, positions: FloatArray, normals: FloatArray, distance: float, angle: float
+) -> NDArray[np.bool_]:
+    """Pieces within `distance` (m) of a line whose normal is within `angle` (rad) of perpendicular to it."""
+    near = np.abs(line.gap(positions)) < distance
+    return np.asarray(near & (axial_difference(normals + 0.5 * np.pi, line.angle) < angle))
