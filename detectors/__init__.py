@@ -1,0 +1,1 @@
+"""Glass in single lidar scans: arrays in, observations and labels out, without any SLAM."""

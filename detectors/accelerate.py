@@ -31,15 +31,16 @@ def _cache_folder() -> str:
     return str((base if _writable(base) else fallback) / "detectors")
 
 
+_config: Any = numba.config
 _FOLDER = _cache_folder()
 
 
 def kernel(function: _F) -> _F:
     """Compile `function` in nopython mode with numpy error semantics, without the GIL, cached."""
     # numba reads the folder when a function is decorated; restored, so that no other package is affected
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _FOLDER
+    before = _config.CACHE_DIR
+    _config.CACHE_DIR = _FOLDER
     try:
         return cast(_F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
     finally:
-        numba.config.CACHE_DIR = before
+        _config.CACHE_DIR = before

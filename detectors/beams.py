@@ -13,7 +13,7 @@ FULL_TURN = 2.0 * math.pi
 
 
 def checked_scan(
-    ranges: ArrayLike, intensities: ArrayLike | None, range_min: float, range_max: float
+    ranges: ArrayLike, intensities: ArrayLike | None, range_min: float, no_echo: float
 ) -> tuple[FloatArray, FloatArray, LabelArray]:
     """Ranges, intensities and base labels of a scan as arrays of one length.
 
@@ -30,7 +30,7 @@ def checked_scan(
         raise ValueError(f"ranges of one scan are needed, not an array of shape {values.shape}")
     if echoes.shape != values.shape:
         raise ValueError(f"{echoes.size} intensities do not fit {values.size} ranges")
-    return values, echoes, base_labels(values, range_min=range_min, range_max=range_max)
+    return values, echoes, base_labels(values, range_min=range_min, no_echo=no_echo)
 
 
 @lru_cache(maxsize=16)

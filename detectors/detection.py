@@ -98,13 +98,14 @@ class Detection:
         keep : ndarray of bool or int
             Mask or indices of the observations kept.
         """
-        return type(self)(self.beam[keep], *(getattr(self, name)[keep] for name in COLUMNS), self.labels)
+        columns: dict[str, FloatArray] = {name: getattr(self, name)[keep] for name in COLUMNS}
+        return type(self)(beam=self.beam[keep], labels=self.labels, **columns)
 
 
 def from_table(beam: IntArray, table: FloatArray, labels: LabelArray) -> Detection:
     """Build a detection from a kernel's table, one row per observation, columns in the order of `COLUMNS`."""
-    columns = np.ascontiguousarray(table.T) if table.size else np.empty((len(COLUMNS), 0))
-    return Detection(beam, *columns, labels)
+    columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
+    return Detection(beam=beam, labels=labels, **columns)
 
 
 def nothing(labels: LabelArray) -> Detection:

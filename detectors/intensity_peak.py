@@ -25,14 +25,15 @@ def intensity_peak(
     angle_min: float,
     angle_increment: float,
     range_min: float = 0.0,
-    range_max: float = math.inf,
+    no_echo: float = math.inf,
     probability: float = 0.7,
 ) -> Detection:
     """Find intensity peaks by height, steepness and width: Algorithm 1 of Cartographer_glass.
 
-    An edge rises at beam p where the intensity is at least `thresh` and `grad` above that of beam p-1. It falls
-    at p where beam p-1 is at least `thresh` and `grad` above beam p. When the fall comes within `width` beams of
-    the rise h, beam floor((p + h) / 2) is glass. A rise is used once, and no edge is seen across invalid beams.
+    An edge rises at beam p where the intensity is at least `thresh` and `grad` above that of beam p-1. It
+    falls at p where beam p-1 is at least `thresh` and `grad` above beam p. When the fall comes within `width`
+    beams of the rise h, beam floor((p + h) / 2) is glass. A rise is used once, and no edge is seen across
+    invalid beams.
 
     Parameters
     ----------
@@ -44,8 +45,8 @@ def intensity_peak(
         Largest width of a peak, beams.
     angle_min, angle_increment : float
         Angle of the first beam and step between beams, rad.
-    range_min, range_max : float
-        Limits of the sensor, m; from `range_max` on a beam has no echo and counts as intensity 0.
+    range_min, no_echo : float
+        Nearer readings are invalid; from `no_echo` on nothing came back, m, which counts as intensity 0.
     probability : float
         Probability given to every observation: thresholds alone cannot tell one peak from another.
 
@@ -66,7 +67,7 @@ def intensity_peak(
     >>> found.beam.tolist(), found.labels.tolist()
     ([2], [1, 1, 2, 1, 1])
     """
-    values, echoes, labels = checked_scan(ranges, intensities, range_min, range_max)
+    values, echoes, labels = checked_scan(ranges, intensities, range_min, no_echo)
     rises, falls = peaks(echoes, labels, thresh, grad, width)
     return _observations(values, echoes, labels, rises, falls, angle_min, angle_increment, probability)
 
@@ -83,7 +84,7 @@ def wang_wang(
     range_difference: float = 0.10,
     range_limit: float = 10.0,
     range_min: float = 0.0,
-    range_max: float = math.inf,
+    no_echo: float = math.inf,
     probability: float = 0.7,
 ) -> Detection:
     """Find intensity peaks whose two edge beams lie at the same range: the rule of Wang & Wang (slam_glass).
@@ -92,7 +93,7 @@ def wang_wang(
     ----------
     ranges, intensities : array_like, shape (n,)
         One scan, m and unit of the sensor.
-    thresh, grad, width, angle_min, angle_increment, range_min, range_max, probability
+    thresh, grad, width, angle_min, angle_increment, range_min, no_echo, probability
         As in `intensity_peak`.
     range_difference : float
         The first and the last beam of a peak differ by less than this, m.
@@ -109,7 +110,7 @@ def wang_wang(
     ValueError
         The arrays do not belong together.
     """
-    values, echoes, labels = checked_scan(ranges, intensities, range_min, range_max)
+    values, echoes, labels = checked_scan(ranges, intensities, range_min, no_echo)
     rises, falls = peaks(echoes, labels, thresh, grad, width)
     level = np.abs(values[rises] - values[falls - 1]) < range_difference
     near = np.maximum(values[rises], values[falls - 1]) <= range_limit

@@ -15,30 +15,28 @@ NO_RETURN: Final = 4
 NAMES: Final = ("invalid", "solid", "glass", "ghost", "no_return")
 
 
-def base_labels(
-    ranges: ArrayLike, *, range_min: float = 0.0, range_max: float = math.inf
-) -> NDArray[np.uint8]:
+def base_labels(ranges: ArrayLike, *, range_min: float = 0.0, no_echo: float = math.inf) -> NDArray[np.uint8]:
     """Sort beams into solid, without return and invalid, before any glass is looked for.
 
     Parameters
     ----------
     ranges : array_like, shape (n,)
         Ranges of one scan, m.
-    range_min, range_max : float
-        Limits of the sensor, m: below the first a reading is invalid, from the second on it is no echo.
+    range_min, no_echo : float
+        Nearer readings are invalid; ranges from `no_echo` on mean that nothing came back, m.
 
     Returns
     -------
     ndarray of uint8, shape (n,)
-        SOLID, NO_RETURN (+inf or at least `range_max`) or INVALID (NaN, -inf, 0, below `range_min`).
+        SOLID, NO_RETURN (+inf or at least `no_echo`) or INVALID (NaN, -inf, 0, below `range_min`).
 
     Examples
     --------
-    >>> base_labels([1.0, np.inf, 0.0, np.nan, 12.0], range_max=10.0).tolist()
+    >>> base_labels([1.0, np.inf, 0.0, np.nan, 12.0], no_echo=10.0).tolist()
     [1, 4, 0, 0, 4]
     """
     values = np.asarray(ranges, dtype=np.float64)
     labels = np.full(values.shape, SOLID, dtype=np.uint8)
     labels[~(values >= range_min) | (values <= 0.0)] = INVALID
-    labels[values >= range_max] = NO_RETURN
+    labels[values >= no_echo] = NO_RETURN
     return labels

@@ -12,7 +12,7 @@ NEIGHBOURS = 3
 def _open_beams(
     ranges: FloatArray, labels: LabelArray, edge: int, step: int, depth: float, closed: bool
 ) -> tuple[int, int]:
-    """Beams beside an edge up to the first one that meets something near: how many, and how many saw nothing."""
+    """Beams beside an edge before one meets something near: how many, and how many saw nothing."""
     passed = 0
     silent = 0
     size = ranges.size
@@ -46,9 +46,9 @@ def find_narrow(
 ) -> int:
     """Write the first beam and the features of every narrow return; returns how many there are.
 
-    Features are the beams of the return, the fewer of the two counts of open beams beside it, the beams beside
-    it that saw nothing at all, the share of the flat surfaces of the scan that are parallel to a pane there, and
-    the mean direction of their normals relative to that of the return, rad.
+    Features are the beams of the return, the fewer of the two counts of open beams beside it, the beams
+    beside it that saw nothing at all, the share of the flat surfaces of the scan that are parallel to a pane
+    there, and the mean direction of their normals relative to that of the return, rad.
     """
     total = wall_directions(ranges, labels, cosines, sines, histogram)
     size = ranges.size
@@ -79,4 +79,3 @@ def find_narrow(
             count += 1
         beam += width
     return count
-

@@ -69,8 +69,8 @@ def narrow_return(
     Returns
     -------
     Detection
-        `strength` is the evidence as log odds, `extent` half the width of the beams of the return. `normal` is
-        the mean normal of the walls parallel to the pane.
+        `strength` is the evidence as log odds, `extent` half the width of the beams of the return. `normal`
+        is the mean normal of the walls parallel to the pane.
 
     Raises
     ------
@@ -128,13 +128,14 @@ def log_odds(features: FloatArray, ranges: FloatArray) -> FloatArray:
     ranges : ndarray, shape (k,)
         Ranges of the returns, m.
     """
-    return (
+    odds: FloatArray = (
         BASE
         + PER_PARALLEL_SHARE * features[:, 3]
         + PER_SILENT_SHARE * features[:, 2] / (2 * NEIGHBOURS)
         + SINGLE_BEAM * (features[:, 0] == 1)
         + TOO_NEAR * (ranges < NEAR)
     )
+    return odds
 
 
 def _table(

@@ -25,8 +25,8 @@ def find_feet(
 ) -> int:
     """Write the beams at which the quieted range is the nearest of its surroundings; returns how many."""
     size = ranges.size
-    half = max(1, int(round(SMOOTHING / angle_increment)))
-    window = max(2, int(round(NEAREST / angle_increment)))
+    half = max(1, round(SMOOTHING / angle_increment))
+    window = max(2, round(NEAREST / angle_increment))
     count = 0
     start = 0
     while start < size:

@@ -43,8 +43,8 @@ def wall_directions(
         sxy += x * y
         dx = x - ranges[start] * cosines[start]
         dy = y - ranges[start] * sines[start]
-        length = math.hypot(dx, dy)
-        if length < PIECE_LENGTH or n < PIECE_BEAMS:
+        squared = dx * dx + dy * dy
+        if squared < PIECE_LENGTH * PIECE_LENGTH or n < PIECE_BEAMS:
             continue
         cxx = sxx / n - (sx / n) ** 2
         cyy = syy / n - (sy / n) ** 2
@@ -53,8 +53,8 @@ def wall_directions(
         if spread < FLATNESS * FLATNESS:
             normal = 0.5 * math.atan2(2.0 * cxy, cxx - cyy) + 0.5 * math.pi
             # a piece is never counted longer than twice the least: one long chord across few beams is a guess
-            weight = min(length, 2.0 * PIECE_LENGTH)
-            histogram[int(round(math.degrees(normal))) % BINS] += weight
+            weight = min(math.sqrt(squared), 2.0 * PIECE_LENGTH)
+            histogram[round(math.degrees(normal)) % BINS] += weight
             total += weight
         start = -1
     return total
@@ -70,7 +70,7 @@ def share_along(
     """
     if total <= 0.0:
         return 0.0, 0.0
-    centre = int(round(math.degrees(direction)))
+    centre = round(math.degrees(direction))
     along = 0.0
     moment = 0.0
     for offset in range(-tolerance_deg, tolerance_deg + 1):

@@ -156,8 +156,6 @@ class GlassWallConfig(Section):
     """Observations a wall rests on at least."""
     min_nodes: Count = 2
     """Different nodes that made them, at least."""
-    min_evidence: Positive = 1.5
-    """Least sum of probabilities around the observation a wall starts from."""
     min_probability: Probability = 0.9
     """Least probability of a wall."""
     min_excess: Positive = 2.0
@@ -176,6 +174,23 @@ class GlassWallConfig(Section):
     """Answers that glass would have given in a gap, had it been there, from which the gap is an opening."""
 
 
+class GlassConfig(Section):
+    """Detection of glass and what becomes of it in the map."""
+
+    detector: Literal["off", "intensity_peak", "wang_wang", "calibrated_peak", "narrow_return"] = "off"
+    """How panes are found in a scan; by intensity for Hokuyo and SICK, by narrow returns for cheap lidars."""
+    sensor: str = ""
+    """Name of the shipped calibration that `calibrated_peak` uses."""
+    thresh: Positive = 3000.0
+    """Least intensity of `intensity_peak` and `wang_wang`, unit of the sensor."""
+    grad: Positive = 500.0
+    """Least rise and fall of the intensity from beam to beam, unit of the sensor."""
+    width: Count = 10
+    """Largest width of an intensity peak, beams."""
+    walls: GlassWallConfig = GlassWallConfig()
+    """Walls fitted from the observations."""
+
+
 class Config(Section):
     """Everything that decides a map, apart from the recording itself."""
 
@@ -187,6 +202,7 @@ class Config(Section):
     loop_closure: LoopClosureConfig = LoopClosureConfig()
     optimization: OptimizationConfig = OptimizationConfig()
     map: MapConfig = MapConfig()
+    glass: GlassConfig = GlassConfig()
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

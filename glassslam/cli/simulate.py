@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 EXAMPLES = """\
   glassslam simulate office -o office.bag
   glassslam simulate office -o office.bag --sensor rplidar --seed 3
+  glassslam simulate glass_building_1 -o glass.bag --rate 20
   glassslam simulate my_floor.yaml -o my_floor.bag --overwrite
 """
 
@@ -31,6 +32,10 @@ Sensor = Annotated[
     typer.Option(metavar="NAME", help="ust10lx, utm30lx, lms200 or rplidar [default: that of the scene]."),
 ]
 Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of all noise: same seed, same bytes.")]
+Rate = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", help="Scans recorded per second [default: that of the scene, or all]."),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing bag.")]
 Json = Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")]
 
@@ -40,12 +45,14 @@ def simulate(
     output: Bag,
     sensor: Sensor = None,
     seed: Seed = 0,
+    rate: Rate = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Write a recording of a robot driving through a simulated building.
 
-    Beside the bag stand the true pose at every scan (BAG.truth.tum) and the true walls (BAG.truth.json).
+    Beside the bag stand the true pose at every scan (BAG.truth.tum), the true walls (BAG.truth.json),
+    the true glass (BAG.truth.glass.geojson) and what every beam met (BAG.truth.labels.npz).
     """
     from glassslam.cli.terminal import emit  # noqa: PLC0415
     from glassslam.simulation import Scene, find_scene  # noqa: PLC0415  (loads numba)
@@ -53,7 +60,7 @@ def simulate(
 
     if output.exists() and not overwrite:
         raise UsageError(f"{output} exists already", "use --overwrite to replace it")
-    simulation = prepare(Scene.load(find_scene(scene)), sensor, seed)
+    simulation = prepare(Scene.load(find_scene(scene)), sensor, seed, rate)
     written = record(simulation, output, quiet=json)
     if json:
         from json import dumps  # noqa: PLC0415
@@ -76,7 +83,7 @@ def describe(simulation: "Simulation", written: "WrittenRecording") -> str:
     seconds = float(simulation.motion.times[-1])
     scans = f"{written.scans} scans of a {simulation.sensor.name}"
     lines = [f"simulated {simulation.scene.name}: {scans}, {simulation.driven:.1f} m in {seconds:.0f} s"]
-    paths = (written.bag, written.true_trajectory, written.true_plan)
+    paths = (written.bag, written.true_trajectory, written.true_plan, written.true_labels, written.true_glass)
     return "".join(f"{line}\n" for line in (*lines, *(f"wrote {path}" for path in paths)))
 
 
@@ -85,6 +92,8 @@ def _summary(simulation: "Simulation", written: "WrittenRecording") -> dict[str,
         "bag": str(written.bag),
         "true_trajectory": str(written.true_trajectory),
         "true_plan": str(written.true_plan),
+        "true_labels": str(written.true_labels),
+        "true_glass": str(written.true_glass),
         "scene": simulation.scene.name,
         "sensor": simulation.sensor.name,
         "seed": simulation.seed,

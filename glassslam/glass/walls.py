@@ -7,42 +7,69 @@ pass at normal incidence more often than glass lets them, there is an opening.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.config import GlassWallConfig
+from glassslam.glass.chains import chains, straight_parts
 from glassslam.glass.evidence_kernels import count_along_line
-from glassslam.glass.lines import Line, axial_difference, fit_line, members
+from glassslam.glass.lines import Line, fit_line, members
 from glassslam.glass.observations import GlassObservations
 from glassslam.records import Float32Array, FloatArray
 
 _STEP = 0.1
-_SOLID_BAND = 0.08
+_SOLID_BAND = 0.1
 _BEYOND = 0.25
 _NORMAL_LIMIT = math.radians(4.0)
-_NEIGHBOURHOOD = 3.0
 _ROUNDS = 6
+_RELIABLE = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class ScanPoints:
-    """Returns of all nodes, packed.
+class Beams:
+    """End points of the beams of all nodes, packed.
 
     Attributes
     ----------
     sensors : ndarray of float64, shape (n, 2)
         Position of the laser in the frame of the base at each node, m.
-    points : ndarray of float32, shape (m, 2)
-        Returns of all nodes in the frames of their bases, m.
+    ends : ndarray of float32, shape (m, 2)
+        End points in the frames of the bases of their nodes, m.
     first : ndarray of int64, shape (n + 1,)
-        Row of `points` where each node begins.
+        Row of `ends` where each node begins.
     """
 
     sensors: FloatArray
-    points: Float32Array
+    ends: Float32Array
     first: NDArray[np.int64]
+
+    @classmethod
+    def pack(cls, sensors: Sequence[FloatArray], ends: Sequence[Float32Array]) -> "Beams":
+        """Pack the end points (m_i, 2) of every node."""
+        lengths = [len(points) for points in ends]
+        joined = np.concatenate(ends) if ends else np.empty((0, 2), np.float32)
+        return cls(
+            np.array(sensors).reshape(-1, 2),
+            joined,
+            np.concatenate(([0], np.cumsum(lengths))).astype(np.int64),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BeamEvidence:
+    """What all beams of a run tell about free space and surfaces.
+
+    Attributes
+    ----------
+    returns, silent : Beams
+        Beams that came back, ending on a surface, and beams without echo, ending in free space.
+    """
+
+    returns: Beams
+    silent: Beams
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +110,7 @@ class GlassWall:
 
 
 def fit_walls(
-    observations: GlassObservations, node_poses: FloatArray, scans: ScanPoints, config: GlassWallConfig
+    observations: GlassObservations, node_poses: FloatArray, beams: BeamEvidence, config: GlassWallConfig
 ) -> list[GlassWall]:
     """All walls that the observations support, the best supported first.
 
@@ -93,83 +120,51 @@ def fit_walls(
         Of the whole run.
     node_poses : ndarray of float64, shape (n, 3)
         Optimised poses of the nodes, m and rad.
-    scans : ScanPoints
-        Returns of all nodes.
+    beams : BeamEvidence
+        Of all nodes.
     config : GlassWallConfig
         Tolerances.
     """
+    if len(observations) < config.min_observations:
+        return []
     positions, normals = observations.at(node_poses)
-    free = np.ones(len(observations), dtype=bool)
     walls: list[GlassWall] = []
-    while free.sum() >= config.min_observations:
-        found = _grow(positions, normals, observations, free, config)
-        if found is None:
+    free = np.ones(len(observations), dtype=bool)
+    for chain in chains(positions, normals, config.max_gap, config.distance_tolerance):
+        if len(chain) < config.min_observations:
             break
-        line, chosen = found
-        free[chosen] = False
-        walls += _pieces(line, chosen, positions, free, observations, node_poses, scans, config)
+        rest = chain[free[chain]]
+        if len(rest) < config.min_observations:
+            continue
+        for part in straight_parts(positions, rest, 0.6 * config.distance_tolerance):
+            line = _robust_line(positions, normals, observations, part, config)
+            walls += _pieces(line, part, positions, free, observations, node_poses, beams, config)
     return walls
 
 
-def _grow(
+def _robust_line(
     positions: FloatArray,
     normals: FloatArray,
     observations: GlassObservations,
-    free: NDArray[np.bool_],
+    chosen: NDArray[np.int64],
     config: GlassWallConfig,
-) -> tuple[Line, NDArray[np.int64]] | None:
-    """The best supported line among the free observations, and those on it."""
-    index = np.flatnonzero(free)
-    seed, support = _best_seed(positions[index], normals[index], observations.probability[index], config)
-    if support < config.min_evidence:
-        return None
-    tolerance, turn = config.distance_tolerance, math.radians(config.angle_tolerance_deg)
-    line = Line(positions[index[seed]], float(normals[index[seed]]) + 0.5 * math.pi, tolerance, turn)
-    chosen = index[:0]
+) -> Line:
+    """Line through the chosen observations, without those that turn out to lie off it."""
+    kept = chosen
     for _ in range(_ROUNDS):
-        on_line = index[members(line, positions[index], normals[index], tolerance, turn)]
-        near = on_line[
-            _connected(line.along(positions[on_line]), line.along(positions[index[seed]][None])[0])
-        ]
-        if len(near) == 0:
-            near = index[seed : seed + 1]
-        if len(near) == len(chosen) and (near == chosen).all():
-            break
-        chosen = near
         line = fit_line(
-            positions[chosen],
-            normals[chosen],
-            observations.position_sigma[chosen],
-            observations.normal_sigma[chosen],
+            positions[kept], normals[kept], observations.position_sigma[kept], observations.normal_sigma[kept]
         )
-    return line, chosen
-
-
-def _best_seed(
-    positions: FloatArray, normals: FloatArray, weights: FloatArray, config: GlassWallConfig
-) -> tuple[int, float]:
-    """The observation with the largest weight of others nearby on its own tangent, and that weight."""
-    best, best_support = 0, -1.0
-    for k in range(len(positions)):
-        offsets = positions - positions[k]
-        across = np.abs(offsets @ np.array([math.cos(normals[k]), math.sin(normals[k])]))
-        close = (across < config.distance_tolerance) & (
-            np.einsum("ij,ij->i", offsets, offsets) < _NEIGHBOURHOOD**2
-        )
-        close &= axial_difference(normals, float(normals[k])) < math.radians(config.angle_tolerance_deg)
-        support = float(weights[close].sum())
-        if support > best_support:
-            best, best_support = k, support
-    return best, best_support
-
-
-def _connected(along: FloatArray, seed: float) -> NDArray[np.int64]:
-    """Indices reached from the seed position without a step longer than the longest bridge."""
-    order = np.argsort(along, kind="stable")
-    steps = np.diff(along[order]) > 2.0 * _NEIGHBOURHOOD
-    groups = np.concatenate(([0], np.cumsum(steps)))
-    at = int(np.argmin(np.abs(along[order] - seed))) if len(order) else 0
-    return np.sort(order[groups == groups[at]]) if len(order) else order
+        near = chosen[
+            members(
+                line, positions[chosen], normals[chosen], config.distance_tolerance,
+                math.radians(config.angle_tolerance_deg),
+            )
+        ]  # fmt: skip
+        if len(near) < 2 or np.array_equal(near, kept):
+            break
+        kept = near
+    return line
 
 
 def _pieces(
@@ -179,7 +174,7 @@ def _pieces(
     free: NDArray[np.bool_],
     observations: GlassObservations,
     node_poses: FloatArray,
-    scans: ScanPoints,
+    beams: BeamEvidence,
     config: GlassWallConfig,
 ) -> list[GlassWall]:
     """Cut a line into the stretches of glass that observations and beams agree on."""
@@ -189,7 +184,7 @@ def _pieces(
     margin = config.max_extension + _STEP
     start = float((along - extents).min()) - margin
     bins = math.ceil((float((along + extents).max()) + margin - start) / _STEP)
-    solid, passed, passed_normal = _counts(line, start, bins, node_poses, scans)
+    solid, passed, passed_normal = _counts(line, start, bins, node_poses, beams)
     seen = np.zeros(bins, dtype=np.int64)
     for s, e in zip(along, extents, strict=True):
         first, last = int((s - e - start) / _STEP), int((s + e - start) / _STEP)
@@ -211,14 +206,16 @@ def _pieces(
 
 
 def _counts(
-    line: Line, start: float, bins: int, node_poses: FloatArray, scans: ScanPoints
+    line: Line, start: float, bins: int, node_poses: FloatArray, beams: BeamEvidence
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Solid returns, passages and passages at normal incidence by piece of the line."""
-    solid, passed, normal = (np.zeros(bins, dtype=np.int64) for _ in range(3))
-    count_along_line(
-        node_poses, scans.sensors, scans.points, scans.first, np.arange(len(node_poses)), line.foot,
-        line.direction, start, _STEP, _SOLID_BAND, _BEYOND, _NORMAL_LIMIT, solid, passed, normal,
-    )  # fmt: skip
+    solid, passed, normal, nothing = (np.zeros(bins, dtype=np.int64) for _ in range(4))
+    everyone = np.arange(len(node_poses))
+    for kind, on_line in ((beams.returns, solid), (beams.silent, nothing)):
+        count_along_line(
+            node_poses, kind.sensors, kind.ends, kind.first, everyone, line.foot, line.direction, start, _STEP,
+            _SOLID_BAND, _BEYOND, _NORMAL_LIMIT, on_line, passed, normal,
+        )  # fmt: skip
     return solid, passed, normal
 
 
@@ -259,7 +256,8 @@ def _may_bridge(
     widest = max((last - first + 1 for first, last in _runs(opaque)), default=0) * _STEP
     if widest > config.max_mullion:
         return False
-    if rate * int(passed_normal.sum()) > config.opening_evidence:
+    # glass that seldom answers even where it stands proves nothing by its silence
+    if rate > _RELIABLE and rate * int(passed_normal.sum()) > config.opening_evidence:
         return False
     silent = ~opaque & (passed == 0)
     return bool(silent.sum() * _STEP <= max(config.max_mullion, 0.5 * length))

@@ -15,6 +15,8 @@ RESULT_FILES = (
     "map.pgm",
     "map.png",
     "trajectory.tum",
+    "glass.geojson",
+    "labels.png",
     "graph.g2o",
     "config.yaml",
     "report.json",

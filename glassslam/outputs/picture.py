@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.errors import OutputError
+from glassslam.glass.layer import GlassLayer
 from glassslam.records import Float32Array, FloatArray, Trajectory
 from glassslam.slam.result import OccupancyMap
 
@@ -17,6 +18,7 @@ _ROWS_AT_ONCE = 256
 _STRIP, _MARGIN = 44, 12
 # Colours are blue, green, red: the order of OpenCV.
 _PATH, _START, _END, _INK = (214, 98, 20), (60, 160, 30), (40, 40, 220), (40, 40, 40)
+_GLASS = (170, 190, 0)
 
 Image = NDArray[np.uint8]
 
@@ -44,7 +46,9 @@ def grey_levels(probability: Float32Array) -> Image:
     return grey
 
 
-def write_picture(grid: OccupancyMap, trajectory: Trajectory, path: str | Path) -> Path:
+def write_picture(
+    grid: OccupancyMap, trajectory: Trajectory, path: str | Path, glass: GlassLayer | None = None
+) -> Path:
     """Draw the map with the trajectory, its start (green), its end (red) and a scale bar, as PNG.
 
     Parameters
@@ -55,6 +59,8 @@ def write_picture(grid: OccupancyMap, trajectory: Trajectory, path: str | Path) 
         Poses in the map frame.
     path : str or Path
         The PNG file to write.
+    glass : GlassLayer, optional
+        Its walls are drawn in blue-green.
 
     Returns
     -------
@@ -74,6 +80,8 @@ def write_picture(grid: OccupancyMap, trajectory: Trajectory, path: str | Path) 
         raise OutputError("the map has no cells", "was there any scan with a range in it?")
     zoom = min(_LARGEST_ZOOM, max(1, math.ceil(_READABLE / max(grid.probability.shape))))
     canvas = _blank(cv2, grid, zoom)
+    if glass is not None:
+        _draw_walls(cv2, canvas[:-_STRIP], grid, glass, zoom)
     _draw_path(cv2, canvas[:-_STRIP], path_pixels(grid, trajectory.poses, zoom))
     _draw_scale(cv2, canvas, pixels_per_metre=zoom / grid.resolution)
     encoded, data = cv2.imencode(".png", canvas)
@@ -124,6 +132,13 @@ def _draw_path(cv2: Any, canvas: Image, pixels: FloatArray) -> None:
     cv2.polylines(canvas, [points], False, _PATH, 1, cv2.LINE_AA, shift=4)
     for point, colour in ((points[0], _START), (points[-1], _END)):
         cv2.circle(canvas, (int(point[0]), int(point[1])), 5 * 16, colour, -1, cv2.LINE_AA, shift=4)
+
+
+def _draw_walls(cv2: Any, canvas: Image, grid: OccupancyMap, glass: GlassLayer, zoom: int) -> None:
+    for wall in glass.walls:
+        ends = path_pixels(grid, np.stack((wall.start, wall.end)), zoom)
+        first, last = (tuple(int(v) for v in np.rint(end * 16.0)) for end in ends)
+        cv2.line(canvas, first, last, _GLASS, 2 if zoom < 3 else 4, cv2.LINE_AA, shift=4)
 
 
 def _draw_scale(cv2: Any, canvas: Image, pixels_per_metre: float) -> None:

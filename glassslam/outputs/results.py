@@ -5,6 +5,8 @@ from pathlib import Path
 
 from glassslam.outputs.directory import staged_directory
 from glassslam.outputs.g2o import write_g2o
+from glassslam.outputs.glass_geojson import write_glass
+from glassslam.outputs.labels import write_labels
 from glassslam.outputs.map_server import write_map
 from glassslam.outputs.picture import write_picture
 from glassslam.outputs.report import Stopwatch, build_report
@@ -48,8 +50,9 @@ def write_results(
     with staged_directory(target, overwrite=overwrite) as folder:
         written = [
             *write_map(result.map, folder / "map.yaml"),
-            write_picture(result.map, result.trajectory, folder / "map.png"),
+            write_picture(result.map, result.trajectory, folder / "map.png", result.glass),
             write_tum(result.trajectory, folder / "trajectory.tum"),
+            *_glass_files(result, folder),
             write_g2o(result.node_poses, result.constraints, folder / "graph.g2o"),
             folder / "config.yaml",
             folder / "report.json",
@@ -61,3 +64,12 @@ def write_results(
             json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8"
         )
     return [target / path.name for path in written]
+
+
+def _glass_files(result: MapResult, folder: Path) -> list[Path]:
+    if result.glass is None:
+        return []
+    return [
+        write_glass(result.glass, folder / "glass.geojson"),
+        write_labels(result.map, result.glass, folder / "labels.png"),
+    ]

@@ -5,13 +5,16 @@ from glassslam.simulation.rosbag1 import write_rosbag1
 from glassslam.simulation.scene import Scene, find_scene
 from glassslam.simulation.sensors import LIDARS, LidarModel, lidar
 from glassslam.simulation.simulate import Simulation, simulate
-from glassslam.simulation.truth import truth_paths, write_truth
+from glassslam.simulation.truth import TruthPaths, truth_paths, write_truth
+from glassslam.simulation.truth_log import TruthLog
 
 __all__ = [
     "LIDARS",
     "LidarModel",
     "Scene",
     "Simulation",
+    "TruthLog",
+    "TruthPaths",
     "WrittenRecording",
     "find_scene",
     "lidar",

@@ -6,13 +6,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from detectors.labels import GLASS, NO_RETURN
 from glassslam.records import Float32Array, FloatArray
 from glassslam.simulation.floorplan import FloorPlan
 from glassslam.simulation.materials import Material
 from glassslam.simulation.optics_kernels import Receiver, Surfaces, lattice
 from glassslam.simulation.raycast import SegmentGrid
 from glassslam.simulation.sensors import LidarModel
-from glassslam.simulation.trace_kernels import GLASS, NO_RETURN, Echoes, Legs, Plan, trace_scan
+from glassslam.simulation.trace_kernels import Echoes, Legs, Plan, trace_scan
 
 NOBODY = Legs(np.empty((0, 5)), np.empty(0))
 """A scene without people."""

@@ -84,7 +84,7 @@ MATERIALS: Final = {
         kind="mirror", reflectance=0.01, gloss=2.5, gloss_width_deg=3.0, mirrored=0.55
     ),
     "glass": Material(kind="glass", reflectance=0.0),
-    "clean_glass": Material(kind="glass", reflectance=0.0, haze=0.5, glint=1.0),
+    "clean_glass": Material(kind="glass", reflectance=0.0, haze=0.02),
     "acrylic": Material(kind="glass", reflectance=0.0, haze=1.2, glint=0.9, flatness_deg=0.2),
     "polycarbonate": Material(kind="glass", reflectance=0.0, haze=1.5, glint=0.75, flatness_deg=0.25),
 }

@@ -8,6 +8,7 @@ from glassslam.records import Record
 from glassslam.simulation.rosbag1 import write_rosbag1
 from glassslam.simulation.simulate import Simulation
 from glassslam.simulation.truth import truth_paths, write_truth
+from glassslam.simulation.truth_log import TruthLog
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +19,8 @@ class WrittenRecording:
     ----------
     bag, true_trajectory, true_plan : Path
         The recording, the true poses (TUM) and the true surfaces (JSON).
+    true_labels, true_glass : Path
+        What every beam met (npz) and the panes (GeoJSON).
     scans : int
         Number of scans in the bag.
     """
@@ -25,6 +28,8 @@ class WrittenRecording:
     bag: Path
     true_trajectory: Path
     true_plan: Path
+    true_labels: Path
+    true_glass: Path
     scans: int
 
 
@@ -53,8 +58,9 @@ def write_recording(
         if progress is not None:
             progress(record.stamp - start)
 
-    scans = write_rosbag1(simulation.records(), bag, simulation.scene.laser_pose, report)
+    log = TruthLog(simulation.plan.segments)
+    scans = write_rosbag1(simulation.records(log.add), bag, simulation.scene.laser_pose, report)
     for stale in truth_paths(bag):
         stale.unlink(missing_ok=True)
-    trajectory, plan = write_truth(simulation, bag)
-    return WrittenRecording(Path(bag), trajectory, plan, scans)
+    truth = write_truth(simulation, bag, log)
+    return WrittenRecording(Path(bag), *truth, scans=scans)

@@ -5,13 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from detectors.labels import GHOST, GLASS, NO_RETURN, SOLID
 from glassslam.accelerate import kernel
 from glassslam.records import Float32Array, FloatArray
 from glassslam.simulation import optics_kernels as optics
 from glassslam.simulation.optics_kernels import Receiver, Surfaces
 from glassslam.simulation.raycast_kernels import nearest_segment
-
-SOLID, GLASS, GHOST, NO_RETURN = 1, 2, 3, 4
 
 _STACK = 16
 _STEPS = 32

@@ -6,12 +6,14 @@ import numpy as np
 
 from glassslam.config import Config
 from glassslam.errors import NoScansError
+from glassslam.glass.layer import GlassLayer
 from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
 from glassslam.slam.extrapolator import PoseExtrapolator
+from glassslam.slam.glass_watch import GlassWatch
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalResult, LocalSlam, prepared
 from glassslam.slam.range_data import prepare
-from glassslam.slam.render import render
+from glassslam.slam.render import render, with_glass
 from glassslam.slam.result import MapResult, OccupancyMap
 from glassslam.slam.scan_check import defect, mended, sweep_time
 from glassslam.slam.scan_queue import ScanQueue, TimedScan
@@ -52,6 +54,7 @@ class Mapper:
         self._global = GlobalSlam(self._config, self._stages)
         self._poses: list[FloatArray] = []
         self._tally = Tally()
+        self._glass = GlassWatch(self._config.glass, self._base_from_laser)
 
     def add(self, record: Record) -> None:
         """Take one record, in the order of the recording."""
@@ -87,7 +90,9 @@ class Mapper:
             self.close()
         with self._stages.measure("rendering"):
             grid = render(self._global.nodes, self._global.poses, self._config.map)
-        return self._result(grid, info)
+        with self._stages.measure("glass"):
+            glass = self._glass.layer(self._global.nodes, self._global.poses)
+        return self._result(grid if glass is None else with_glass(grid, glass), info, glass)
 
     def close(self) -> None:
         """Stop background work; without `finish` this gives the run up."""
@@ -120,6 +125,8 @@ class Mapper:
             time, result.pose_in_local, odometry, 0.5 * sweep_time(scan), prediction.twist
         )
         self._poses.append(result.pose_in_local)
+        if self._glass.is_on:
+            self._glass.add(scan, result)
         self._tally.place(scan, len(data.returns), with_odometry=odometry is not None)
         return result
 
@@ -133,7 +140,7 @@ class Mapper:
                 f"used are ranges the scans call valid, from {limits.min_range:g} to {limits.max_range:g} m",
             )
 
-    def _result(self, grid: OccupancyMap, info: RecordingInfo | None) -> MapResult:
+    def _result(self, grid: OccupancyMap, info: RecordingInfo | None, glass: GlassLayer | None) -> MapResult:
         nodes = self._global.nodes
         poses = np.array(self._global.poses)
         every = corrected_poses(
@@ -154,4 +161,5 @@ class Mapper:
                 self._tally, self._extrapolator, self._local, self._global, self._stages
             ),
             info=info,
+            glass=glass,
         )

@@ -6,6 +6,7 @@ import numpy as np
 
 from glassslam.config import MapConfig
 from glassslam.geometry import transform_points
+from glassslam.glass.layer import GlassLayer, locked, wall_cells
 from glassslam.grid.probability_grid import OddsModel, ProbabilityGrid
 from glassslam.records import FloatArray
 from glassslam.slam.node import Node
@@ -23,3 +24,10 @@ def render(nodes: Sequence[Node], poses: FloatArray, config: MapConfig) -> Occup
         )
     grid.finish()
     return OccupancyMap(grid.probability(), config.resolution, (float(grid.origin[0]), float(grid.origin[1])))
+
+
+def with_glass(grid: OccupancyMap, layer: GlassLayer) -> OccupancyMap:
+    """The map with the cells of its glass walls occupied."""
+    shape = (grid.probability.shape[0], grid.probability.shape[1])
+    mask = wall_cells(layer.walls, shape, grid.origin, grid.resolution)
+    return OccupancyMap(locked(grid.probability, mask), grid.resolution, grid.origin)

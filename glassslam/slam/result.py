@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from glassslam.config import Config
+from glassslam.glass.layer import GlassLayer
 from glassslam.posegraph.graph import Constraint
 from glassslam.records import Float32Array, FloatArray, RecordingInfo, Trajectory
 
@@ -101,6 +102,8 @@ class MapResult:
         Counts and times.
     info : RecordingInfo or None
         The source, when the run had one.
+    glass : GlassLayer or None
+        Glass walls and observations; None when glass was not looked for.
     """
 
     map: OccupancyMap
@@ -112,3 +115,4 @@ class MapResult:
     config: Config
     statistics: RunStatistics
     info: RecordingInfo | None = None
+    glass: GlassLayer | None = None

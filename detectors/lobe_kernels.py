@@ -1,0 +1,135 @@
+"""How the intensity of a flat surface falls off on both sides of its normal."""
+
+import math
+
+from detectors.accelerate import kernel
+from detectors.detection import FloatArray, LabelArray
+from detectors.labels import NO_RETURN, SOLID
+from detectors.pane_lines import TOLERANCE, TOLERANCE_PER_METRE
+
+# angles from the normal between which matte surfaces are as bright as ever and panes are not, rad
+SHOULDER_FROM = math.radians(6.0)
+SHOULDER_TO = math.radians(25.0)
+# the mirror peak itself, which the fit of the lobe leaves out, rad
+CORE = math.radians(1.5)
+LOBE_TO = math.radians(30.0)
+DIMMEST = 0.005
+OUTLIER = 0.25
+LOBE_ROUNDS = 4
+
+# columns of the shoulder counts
+TOTAL, ANSWERED, DIM, PASSED = range(4)
+
+
+@kernel
+def count_shoulders(
+    ranges: FloatArray,
+    labels: LabelArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    levels: FloatArray,
+    angle_min: float,
+    angle_increment: float,
+    first: int,
+    last: int,
+    normal: float,
+    distance: float,
+    faint: float,
+    counts: FloatArray,
+) -> float:
+    """Count beams at the shoulders: all, answered by the surface, faint among these, passed behind it.
+
+    `counts` has shape (2, 4): clockwise and counter-clockwise side. Faint is a level below `faint`. Returns
+    the highest level of the core.
+    """
+    counts[:] = 0.0
+    peak = 0.0
+    c = math.cos(normal)
+    s = math.sin(normal)
+    tolerance = TOLERANCE + TOLERANCE_PER_METRE * distance
+    for beam in range(first, last):
+        phi = angle_min + angle_increment * beam - normal
+        away = abs(phi)
+        if away > SHOULDER_TO or CORE < away < SHOULDER_FROM:
+            continue
+        side = 1 if phi > 0.0 else 0
+        if labels[beam] == NO_RETURN:
+            if away >= SHOULDER_FROM:
+                counts[side, TOTAL] += 1.0
+                counts[side, PASSED] += 1.0
+            continue
+        if labels[beam] != SOLID:
+            continue
+        behind = ranges[beam] * (cosines[beam] * c + sines[beam] * s) - distance
+        if away <= CORE:
+            if abs(behind) < tolerance:
+                peak = max(peak, levels[beam])
+            continue
+        counts[side, TOTAL] += 1.0
+        if abs(behind) < tolerance:
+            counts[side, ANSWERED] += 1.0
+            counts[side, DIM] += levels[beam] < faint
+        elif behind > 2.0 * tolerance:
+            counts[side, PASSED] += 1.0
+    return peak
+
+
+@kernel
+def fit_lobe(
+    ranges: FloatArray,
+    labels: LabelArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    levels: FloatArray,
+    angle_min: float,
+    angle_increment: float,
+    first: int,
+    last: int,
+    normal: float,
+    distance: float,
+    angles: FloatArray,
+    logs: FloatArray,
+) -> tuple[float, float, float, int]:
+    """Fit level = amplitude * exp(-decay * |angle|) robustly to the returns on a line.
+
+    Returns the amplitude, the decay (1/rad), the spread of the logarithm and the number of beams. `angles`
+    and `logs` are room for as many values as there are beams.
+    """
+    used = 0
+    c = math.cos(normal)
+    s = math.sin(normal)
+    tolerance = TOLERANCE + TOLERANCE_PER_METRE * distance
+    for beam in range(first, last):
+        if labels[beam] != SOLID:
+            continue
+        away = abs(angle_min + angle_increment * beam - normal)
+        behind = ranges[beam] * (cosines[beam] * c + sines[beam] * s) - distance
+        if CORE <= away <= LOBE_TO and abs(behind) <= tolerance:
+            angles[used] = away
+            logs[used] = math.log(max(levels[beam], DIMMEST))
+            used += 1
+    if used < 4:
+        return 0.0, 0.0, math.inf, used
+    intercept = 0.0
+    decay = 0.0
+    spread = math.inf
+    for step in range(LOBE_ROUNDS):
+        n = sx = sy = sxx = sxy = deviation = 0.0
+        for k in range(used):
+            weight = 1.0
+            if step > 0:
+                residual = abs(logs[k] - intercept + decay * angles[k])
+                deviation += min(residual, 1.0)
+                weight = 1.0 / (1.0 + (residual / OUTLIER) ** 2)
+            n += weight
+            sx += weight * angles[k]
+            sy += weight * logs[k]
+            sxx += weight * angles[k] * angles[k]
+            sxy += weight * angles[k] * logs[k]
+        variance = sxx - sx * sx / n
+        if variance < 1e-9:
+            return 0.0, 0.0, math.inf, used
+        decay = -(sxy - sx * sy / n) / variance
+        intercept = (sy + decay * sx) / n
+        spread = deviation / used
+    return math.exp(min(intercept, 5.0)), decay, spread, used
