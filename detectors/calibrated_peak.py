@@ -43,9 +43,9 @@ def calibrated_peak(
 
     Intensities are divided by the diffuse level at their range. A flat surface whose returns are faint beside
     its normal, and ever fainter away from it, is a pane: matte and painted surfaces stay near 1 there,
-    whatever shines in between; mullions and reflectors have no faint shoulders. Every return of such a surface
-    belongs to the pane, at whatever incidence. Where nothing but the mirror peak comes back, it must be
-    brighter than a matte surface, stand alone, and be parallel to other walls of the scan.
+    whatever shines in between; mullions and reflectors have no faint shoulders. Every return of such a
+    surface belongs to the pane, at whatever incidence. Where nothing but the mirror peak comes back, it must
+    be brighter than a matte surface, stand alone, and be parallel to other walls of the scan.
 
     Parameters
     ----------

@@ -9,22 +9,17 @@ from typing import Any
 import numpy as np
 
 from detectors.calibrated_peak import calibrated_peak
-from detectors.calibration import Calibration, PaneModel
+from detectors.calibration import Calibration
 from detectors.detection import Detection, FloatArray
 from detectors.intensity_peak import intensity_peak
+from detectors.pane_lobe import CORE, core, faces, faint_level, fit_pane_lobe, pane_model
 from detectors.panes import PaneProfile
 from detectors.rates import Rate, wilson
 
-# the mirror peak, and the stretch of the lobe that is fitted, rad
-CORE = math.radians(1.5)
-LOBE = (math.radians(2.0), math.radians(30.0))
-SHOULDER = (math.radians(6.0), math.radians(25.0))
 ON_PANE = 0.15
 THRESH_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 GRAD_FACTORS = (0.05, 0.1, 0.2, 0.4)
 WIDTHS_DEG = (1.25, 2.5, 5.0)
-FAINT_LIMITS = (0.2, 0.6)
-DEFAULT_FAINT = 0.45
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +67,8 @@ def propose(calibration: Calibration, scans: Sequence[CalibrationScan]) -> Calib
     """Complete a calibration that has its diffuse curve with thresholds and the rates to expect.
 
     The plain thresholds are those of a grid over height, steepness and width with the best difference of
-    detection and false alarms. The normalised ones follow from the lobes of the panes. The rates are counted on
-    the same scans, so they are optimistic where these are few: the intervals say how far they may be off.
+    detection and false alarms. The normalised ones follow from the lobes of the panes. The rates are counted
+    on the same scans, so they are optimistic where these are few: the intervals say by how much.
 
     Parameters
     ----------
@@ -100,10 +95,10 @@ def propose(calibration: Calibration, scans: Sequence[CalibrationScan]) -> Calib
     normalised = replace(
         calibration,
         pane=model,
-        faint=_faint_level(profiles),
-        weakest_decay=round(float(np.clip(0.4 * model.decay, 1.0, 4.0)), 2),
+        faint=faint_level(profiles),
+        weakest_decay=round(float(np.clip(0.33 * model.decay, 1.0, 4.0)), 2),
     )
-    peaks = np.array([pane.intensities[_core(pane)].max() for pane in profiles])
+    peaks = np.array([pane.intensities[core(pane)].max() for pane in profiles])
     thresh, grad, width, plain = _plain_thresholds(normalised, scans, float(np.median(peaks)))
     ours = expected(scans, lambda scan: _calibrated(scan, normalised))
     evidence = {
@@ -114,63 +109,6 @@ def propose(calibration: Calibration, scans: Sequence[CalibrationScan]) -> Calib
         "calibrated_peak": ours.to_dict(),
     }
     return replace(normalised, thresh=thresh, grad=grad, width=width, evidence=evidence)
-
-
-def faces(pane: PaneProfile) -> bool:
-    """Whether the pane answers at normal incidence."""
-    return bool(_core(pane).any())
-
-
-def _core(pane: PaneProfile) -> Any:
-    return pane.answered & (np.abs(pane.angles) < CORE)
-
-
-def fit_pane_lobe(pane: PaneProfile) -> tuple[float, float] | None:
-    """Fit level = haze * exp(-decay * |angle|) to the answers of one pane.
-
-    Parameters
-    ----------
-    pane : PaneProfile
-        Any number of beams.
-
-    Returns
-    -------
-    tuple of float or None
-        Haze and decay (1/rad); None where fewer than 6 beams answer beside the mirror peak.
-    """
-    away = np.abs(pane.angles)
-    used = pane.answered & (away > LOBE[0]) & (away < LOBE[1]) & (pane.levels > 0.0)
-    if np.count_nonzero(used) < 6:
-        return None
-    x, y = away[used], np.log(pane.levels[used])
-    trust = np.ones_like(y)
-    slope = intercept = 0.0
-    for _ in range(20):
-        slope, intercept = np.polyfit(x, y, 1, w=np.sqrt(trust))
-        trust = 1.0 / (1.0 + ((y - slope * x - intercept) / 0.25) ** 2)
-    return math.exp(intercept), -float(slope)
-
-
-def pane_model(profiles: Sequence[PaneProfile], lobes: FloatArray) -> PaneModel:
-    """Median lobe and mirror peak of some panes; what no pane shows keeps its default."""
-    peak = float(np.median([pane.levels[_core(pane)].max() for pane in profiles]))
-    if not len(lobes):
-        return PaneModel(peak=round(peak, 2))
-    haze, decay = np.median(lobes, axis=0)
-    return PaneModel(round(float(haze), 3), round(float(decay), 2), round(peak, 2))
-
-
-def _faint_level(profiles: Sequence[PaneProfile]) -> float:
-    """Half way, on the scale of logarithms, between the shoulders of panes and a matte wall."""
-    shoulders = [
-        pane.levels[pane.answered & (np.abs(pane.angles) > SHOULDER[0]) & (np.abs(pane.angles) < SHOULDER[1])]
-        for pane in profiles
-    ]
-    levels = np.concatenate(shoulders)
-    if levels.size == 0:
-        return DEFAULT_FAINT
-    middle = math.sqrt(max(float(np.percentile(levels, 75)), 1e-3))
-    return round(float(np.clip(middle, *FAINT_LIMITS)), 3)
 
 
 def expected(scans: Sequence[CalibrationScan], detect: Any) -> Expected:
@@ -232,7 +170,7 @@ def _plain_thresholds(
 
         def detect(
             scan: CalibrationScan, thresh: float = thresh, grad: float = grad, width: int = width
-        ) -> Any:
+        ) -> Detection:
             return intensity_peak(
                 scan.ranges,
                 scan.intensities,

@@ -22,8 +22,8 @@ def local_incidence(
 ) -> None:
     """Fit a line to the returns within half of `length` (m) on both sides of every beam.
 
-    Writes the angle between beam and surface normal, rad, and the spread of the returns about the line, m; NaN
-    where the surface ends or has too few beams.
+    Writes the angle between beam and surface normal, rad, and the spread of the returns about the line, m;
+    NaN where the surface ends or has too few beams.
     """
     size = ranges.size
     for beam in range(size):

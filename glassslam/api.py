@@ -91,9 +91,12 @@ def map_recording(
 
     mapper = Mapper(config or Config(), source.info.base_from_laser)
     reporter = _Reporter(progress, source.info)
-    _feed(mapper, source, reporter)
-    reporter.tell("finishing")
-    result = mapper.finish(source.info)
+    try:
+        _feed(mapper, source, reporter)
+        reporter.tell("finishing")
+        result = mapper.finish(source.info)
+    finally:
+        mapper.close()
     reporter.tell("done")
     result.statistics.messages_dropped.update(source.dropped)
     result.statistics.warnings[:0] = source.warnings

@@ -9,6 +9,7 @@ import pytest
 
 import glassslam as gs
 from glassslam import api
+from glassslam.errors import RecordingError
 from glassslam.records import LaserScan, Odometry, RecordingInfo
 
 
@@ -45,6 +46,9 @@ def world(monkeypatch, tiny_result):
         def finish(self, info=None):
             notes.info = info
             return tiny_result
+
+        def close(self):
+            notes.closed = True
 
     def open_recording(paths, options):
         notes.source = Source(paths, options)
@@ -91,6 +95,17 @@ def test_progress_is_told_to_the_end(world, monkeypatch):
         ("done", 3, 2.0),
     ]
     assert told[0].info is world.source.info
+
+
+def test_a_run_that_fails_leaves_no_work_in_the_background(world, monkeypatch):
+    def fail(self):
+        yield scan(10.0)
+        raise RecordingError("cut short")
+
+    monkeypatch.setattr(Source, "records", fail)
+    with pytest.raises(RecordingError, match="cut short"):
+        gs.map_recording("run.clf")
+    assert world.closed
 
 
 @pytest.mark.parametrize("name", gs.__all__)

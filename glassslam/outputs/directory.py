@@ -15,12 +15,13 @@ RESULT_FILES = (
     "map.pgm",
     "map.png",
     "trajectory.tum",
-    "glass.geojson",
-    "labels.png",
     "graph.g2o",
     "config.yaml",
     "report.json",
 )
+"""What every run writes."""
+GLASS_FILES = ("glass.geojson", "labels.png")
+"""What a run that looks for glass writes as well."""
 
 _HINTS = {
     errno.ENOSPC: "free some space or choose another disk",
@@ -61,7 +62,7 @@ def check_directory(directory: str | Path, *, overwrite: bool = False) -> Path:
         present = sorted(entry.name for entry in target.iterdir()) if target.exists() else []
     except OSError as error:
         raise _unwritable(directory, error) from error
-    if foreign := [name for name in present if name not in RESULT_FILES]:
+    if foreign := [name for name in present if name not in RESULT_FILES + GLASS_FILES]:
         raise OutputError(
             f"{directory} holds files that are no results: {', '.join(foreign[:3])}", "choose a new directory"
         )
