@@ -50,6 +50,8 @@ class Calibration:
         Weakest and strongest intensity that the sensor reports; 0 and +inf when not known.
     informative : bool
         Whether intensities tell surfaces apart at all.
+    detector : str
+        The detector that suits the sensor: "calibrated_peak", "narrow_return" or "off".
     thresh, grad : float
         Thresholds of `intensity_peak`, unit of the sensor.
     width : int
@@ -76,6 +78,7 @@ class Calibration:
     floor: float = 0.0
     saturation: float = float("inf")
     informative: bool = True
+    detector: str = "calibrated_peak"
     thresh: float = 0.0
     grad: float = 0.0
     width: int = 0

@@ -17,6 +17,12 @@ DIMMEST = 0.005
 OUTLIER = 0.25
 LOBE_ROUNDS = 4
 
+# parts of the shoulders between which haze still falls, and a dark polished surface no longer does, rad
+INNER_FROM = math.radians(12.0)
+INNER_TO = math.radians(18.0)
+OUTER_FROM = math.radians(21.0)
+LEAST_OUTER = 4
+
 # columns of the shoulder counts
 TOTAL, ANSWERED, DIM, PASSED = range(4)
 
@@ -72,6 +78,29 @@ def count_shoulders(
         elif behind > 2.0 * tolerance:
             counts[side, PASSED] += 1.0
     return peak
+
+
+@kernel
+def outer_fall(angles: FloatArray, logs: FloatArray, used: int, faint: float) -> float:
+    """Fall of the logarithm of the level between the inner and the outer part of the shoulders; +inf unseen.
+
+    Only faint returns count: a wall in the plane of a pane is no shoulder of it.
+    """
+    brightest = math.log(faint)
+    inner = outer = 0.0
+    inside = outside = 0
+    for k in range(used):
+        if logs[k] >= brightest:
+            continue
+        if INNER_FROM < angles[k] < INNER_TO:
+            inner += logs[k]
+            inside += 1
+        elif OUTER_FROM < angles[k]:
+            outer += logs[k]
+            outside += 1
+    if inside < LEAST_OUTER or outside < LEAST_OUTER:
+        return math.inf
+    return inner / inside - outer / outside
 
 
 @kernel

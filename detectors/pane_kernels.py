@@ -5,7 +5,7 @@ import math
 from detectors.accelerate import kernel
 from detectors.detection import FloatArray, IntArray, LabelArray
 from detectors.labels import SOLID
-from detectors.lobe_kernels import ANSWERED, DIM, PASSED, TOTAL, count_shoulders, fit_lobe
+from detectors.lobe_kernels import ANSWERED, DIM, PASSED, TOTAL, count_shoulders, fit_lobe, outer_fall
 from detectors.pane_lines import (
     FIRST_TOLERANCE,
     FIT_HALF_ANGLE,
@@ -28,6 +28,11 @@ LEAST_FAINT = 8
 # least angle over which a lobe is told from the edges of a post, rad
 LEAST_SPAN = math.radians(4.0)
 BRIGHTEST_HAZE = 1.5
+DIMMEST_HAZE = 0.4
+DIM_WEIGHT = 2.0
+LEAST_FALL = 0.25
+FLOOR_WEIGHT = 20.0
+STEADY_COST = 6.0
 # a pane this certain is not measured again from the other beams that lie on it
 CERTAIN = 2.5
 # far away only the mirror peak of a pane comes back, and what looks like haze is mostly something else, m
@@ -105,6 +110,17 @@ def lobe_odds(
     odds -= 60.0 * max(0.0, spread - 0.03)
     odds -= PER_METRE * max(0.0, distance - HAZE_REACH)
     return odds
+
+
+@kernel
+def polish_odds(amplitude: float, fall: float) -> float:
+    """Log odds against a pane that shines like polished metal or lacquer: a mirror lobe over a dark floor.
+
+    The haze of a pane has `amplitude` at the normal and keeps falling to where it is no longer seen; the floor
+    stays as it is (`fall` is that of its logarithm).
+    """
+    level = min(STEADY_COST, FLOOR_WEIGHT * max(0.0, LEAST_FALL - fall))
+    return level + DIM_WEIGHT * max(0.0, math.log(DIMMEST_HAZE / max(amplitude, 1e-3)))
 
 
 @kernel
@@ -217,6 +233,7 @@ def find_panes(
             logs,
         )
         odds = lobe_odds(counts, distance, amplitude, decay, deviation, spread, weakest_decay)
+        odds -= polish_odds(amplitude, outer_fall(angles, logs, lobe_beams, faint))
         if odds < least_odds or lobe_beams < LEAST_FAINT:
             continue
         row[NORMAL] = normal

@@ -1,5 +1,6 @@
-"""`glassslam evaluate`: compare a trajectory with the truth."""
+"""`glassslam evaluate`: compare a trajectory and glass with the truth."""
 
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,17 +9,25 @@ import typer
 from glassslam.errors import UsageError
 
 if TYPE_CHECKING:
-    from glassslam.evaluation import ErrorSummary, RelationErrors
+    from rich.table import Table
+
+    from glassslam.evaluation import ErrorSummary, GlassErrors, RelationErrors
     from glassslam.records import Trajectory
 
 EXAMPLES = """\
   glassslam evaluate run-map --relations intel.relations
   glassslam evaluate run-map --trajectory truth.tum
   glassslam evaluate other.tum --relations intel.relations --json
+  glassslam evaluate run-map --glass glass.geojson
 """
 
 Results = Annotated[
-    Path, typer.Argument(metavar="DIR", help="Results directory of map, or a TUM file.", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="DIR",
+        help="Results directory of map, a TUM file, or for --glass a GeoJSON file.",
+        show_default=False,
+    ),
 ]
 RelationFile = Annotated[
     Path | None,
@@ -27,6 +36,14 @@ RelationFile = Annotated[
 TrajectoryFile = Annotated[
     Path | None,
     typer.Option("--trajectory", metavar="TUM", help="True trajectory: t x y z qx qy qz qw."),
+]
+GlassFile = Annotated[
+    Path | None,
+    typer.Option("--glass", metavar="FILE", help="True glass: GeoJSON lines of kind wall or glass, in m."),
+]
+Align = Annotated[
+    bool,
+    typer.Option("--align", help="Lay the glass onto the truth first, for a truth in another frame."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Verbose = Annotated[
@@ -38,19 +55,31 @@ def evaluate(
     results: Results,
     relations: RelationFile = None,
     trajectory: TrajectoryFile = None,
+    glass: GlassFile = None,
+    align: Align = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> None:
-    """Compare the trajectory of a run with true relations (Kuemmerle et al. 2009) or a true trajectory.
+    """Compare a run with true relations (Kuemmerle et al. 2009), a true trajectory, or true glass.
 
     The error of a relation is inv(true) * estimated; means and standard deviations in m and deg.
     A trajectory is aligned without scale (ATE) and compared step by step (RPE over 1 pose and 1 m).
+    Glass counts as found where a wall is within 0.10, 0.15 or 0.25 m of it, by points every centimetre.
     """
-    if relations is None and trajectory is None:
-        raise UsageError("nothing to compare with", "give --relations FILE or --trajectory TUM")
-    from dataclasses import asdict  # noqa: PLC0415
+    if relations is None and trajectory is None and glass is None:
+        raise UsageError("nothing to compare with", "give --relations FILE, --trajectory TUM or --glass FILE")
+    if align and glass is None:
+        raise UsageError("--align needs --glass", "a trajectory is always aligned")
+    errors = _errors(results, relations, trajectory, verbose)
+    if glass is not None:
+        errors["glass"] = _glass_errors(results, glass, align)
+    _show(errors, json)
 
-    from glassslam.cli.terminal import emit  # noqa: PLC0415
+
+def _errors(results: Path, relations: Path | None, trajectory: Path | None, verbose: bool) -> dict[str, Any]:
+    """Errors of the trajectory against the truths that are given."""
+    if relations is None and trajectory is None:
+        return {}
     from glassslam.outputs import read_tum  # noqa: PLC0415  (loads numpy)
 
     estimate = read_tum(results / "trajectory.tum" if results.is_dir() else results)
@@ -59,12 +88,51 @@ def evaluate(
         errors.update(_relation_errors(estimate, relations, verbose))
     if trajectory is not None:
         errors.update(_trajectory_errors(estimate, trajectory))
-    if json:
-        from json import dumps  # noqa: PLC0415
+    return errors
 
+
+def _show(errors: dict[str, Any], as_json: bool) -> None:
+    from dataclasses import asdict  # noqa: PLC0415
+    from json import dumps  # noqa: PLC0415
+
+    from glassslam.cli.terminal import emit, emit_rich  # noqa: PLC0415
+
+    if as_json:
         emit(dumps({name: asdict(error) for name, error in errors.items()}, indent=2) + "\n")
-    else:
-        emit("".join(line for name, error in errors.items() for line in _lines(name, error)))
+        return
+    emit("".join(line for name, error in errors.items() if name != "glass" for line in _lines(name, error)))
+    if "glass" in errors:
+        emit_rich(_glass_table(errors["glass"]), _glass_line(errors["glass"]))
+
+
+def _glass_errors(results: Path, path: Path, align: bool) -> "GlassErrors":
+    from glassslam.evaluation import evaluate_glass, read_glass_walls, read_true_glass  # noqa: PLC0415
+
+    walls = read_glass_walls(results / "glass.geojson" if results.is_dir() else results)
+    return evaluate_glass(walls, read_true_glass(path), align=align)
+
+
+def _glass_table(errors: "GlassErrors") -> "Table":
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(title=f"glass: {errors.true_length:.2f} m true, {errors.wall_length:.2f} m of walls")
+    for heading in ("within", "found", "of true", "panes", "false"):
+        table.add_column(heading, justify="right")
+    for row in errors.within:
+        percent = "-" if row.found_percent is None else f"{row.found_percent:.1f} %"
+        panes = f"{row.panes_found} of {errors.panes}"
+        found, false = f"{row.found:.2f} m", f"{row.false:.2f} m"
+        table.add_row(f"{row.tolerance:.2f} m", found, percent, panes, false)
+    return table
+
+
+def _glass_line(errors: "GlassErrors") -> str:
+    limit = errors.within[-1].tolerance
+    line = f"false glass: {errors.false_length:.2f} m, more than {limit:.2f} m from all true glass"
+    if errors.true_from_map is None:
+        return line
+    x, y, theta = errors.true_from_map
+    return f"{line}\naligned by {x:.3f} m, {y:.3f} m, {degrees(theta):.2f} deg"
 
 
 def _relation_errors(estimate: "Trajectory", path: Path, verbose: bool) -> dict[str, Any]:

@@ -1,5 +1,7 @@
-"""How good a trajectory is: against true relations and against a reference trajectory."""
+"""How good a run is: its trajectory against relations or a reference, its glass against true panes."""
 
+from glassslam.evaluation.glass import GlassErrors, GlassWithin, evaluate_glass
+from glassslam.evaluation.glass_lines import read_glass_walls, read_true_glass
 from glassslam.evaluation.lookup import poses_at
 from glassslam.evaluation.relations import (
     RelationErrors,
@@ -19,6 +21,8 @@ from glassslam.evaluation.trajectory import (
 
 __all__ = [
     "ErrorSummary",
+    "GlassErrors",
+    "GlassWithin",
     "PoseErrors",
     "RelationErrors",
     "Relations",
@@ -26,8 +30,11 @@ __all__ = [
     "absolute_trajectory_error",
     "align",
     "associate",
+    "evaluate_glass",
     "evaluate_relations",
     "poses_at",
+    "read_glass_walls",
     "read_relations",
+    "read_true_glass",
     "relative_pose_error",
 ]

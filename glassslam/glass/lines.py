@@ -51,7 +51,8 @@ class Line:
 
 def axial_difference(a: FloatArray | float, b: FloatArray | float) -> FloatArray:
     """Angle between undirected lines, in [0, pi / 2], rad."""
-    return np.abs((np.asarray(a) - np.asarray(b) + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
+    difference: FloatArray = (np.asarray(a) - np.asarray(b) + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    return np.abs(difference)
 
 
 def fit_line(
@@ -79,11 +80,10 @@ def fit_line(
     across = offsets @ np.array([-math.sin(by_normals), math.cos(by_normals)])
     spread = float(weights @ along**2)
     slope = float(weights @ (along * across)) / spread if spread > 0 else 0.0
-    slope_information = spread
-    share = slope_information / (slope_information + 1.0 / normal_variance)
-    angle = by_normals + share * math.atan(slope)
-    angle_variance = 1.0 / (slope_information + 1.0 / normal_variance)
-    return Line(foot, angle, float(1.0 / math.sqrt(weights.sum())), math.sqrt(angle_variance))
+    # the weighted spread is the information on the slope: the inverse of its variance
+    information = spread + 1.0 / normal_variance
+    angle = by_normals + spread / information * math.atan(slope)
+    return Line(foot, angle, 1.0 / math.sqrt(float(weights.sum())), 1.0 / math.sqrt(information))
 
 
 def _mean_axis(angles: FloatArray, weights: FloatArray) -> tuple[float, float]:

@@ -18,14 +18,13 @@ from glassslam.glass.chains import chains, straight_parts
 from glassslam.glass.evidence_kernels import count_along_line
 from glassslam.glass.lines import Line, fit_line, members
 from glassslam.glass.observations import GlassObservations
+from glassslam.glass.stretches import STEP, glass_stretches, runs
 from glassslam.records import Float32Array, FloatArray
 
-_STEP = 0.1
 _SOLID_BAND = 0.1
 _BEYOND = 0.25
 _NORMAL_LIMIT = math.radians(4.0)
 _ROUNDS = 6
-_RELIABLE = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +108,18 @@ class GlassWall:
         return float(np.hypot(*(self.end - self.start)))
 
 
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    """Everything known when walls are fitted, with the observations placed in the map frame."""
+
+    observations: GlassObservations
+    positions: FloatArray
+    normals: FloatArray
+    node_poses: FloatArray
+    beams: BeamEvidence
+    config: GlassWallConfig
+
+
 def fit_walls(
     observations: GlassObservations, node_poses: FloatArray, beams: BeamEvidence, config: GlassWallConfig
 ) -> list[GlassWall]:
@@ -128,6 +139,7 @@ def fit_walls(
     if len(observations) < config.min_observations:
         return []
     positions, normals = observations.at(node_poses)
+    scene = _Scene(observations, positions, normals, node_poses, beams, config)
     walls: list[GlassWall] = []
     free = np.ones(len(observations), dtype=bool)
     for chain in chains(positions, normals, config.max_gap, config.distance_tolerance):
@@ -138,7 +150,7 @@ def fit_walls(
             continue
         for part in straight_parts(positions, rest, 0.6 * config.distance_tolerance):
             line = _robust_line(positions, normals, observations, part, config)
-            walls += _pieces(line, part, positions, free, observations, node_poses, beams, config)
+            walls += _pieces(line, part, free, scene)
     return walls
 
 
@@ -167,42 +179,44 @@ def _robust_line(
     return line
 
 
-def _pieces(
-    line: Line,
-    chosen: NDArray[np.int64],
-    positions: FloatArray,
-    free: NDArray[np.bool_],
-    observations: GlassObservations,
-    node_poses: FloatArray,
-    beams: BeamEvidence,
-    config: GlassWallConfig,
-) -> list[GlassWall]:
-    """Cut a line into the stretches of glass that observations and beams agree on."""
-    everywhere = line.along(positions)
-    along = everywhere[chosen]
-    extents = np.maximum(observations.extent[chosen], 0.5 * _STEP)
-    margin = config.max_extension + _STEP
-    start = float((along - extents).min()) - margin
-    bins = math.ceil((float((along + extents).max()) + margin - start) / _STEP)
-    solid, passed, passed_normal = _counts(line, start, bins, node_poses, beams)
-    seen = np.zeros(bins, dtype=np.int64)
-    for s, e in zip(along, extents, strict=True):
-        first, last = int((s - e - start) / _STEP), int((s + e - start) / _STEP)
-        seen[max(first, 0) : last + 1] += 1
-    glass = _bridged(seen, solid, passed, passed_normal, config)
+def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scene: _Scene) -> list[GlassWall]:
+    """Walls on a line, where observations and beams agree on glass; what lies on them is no longer free."""
+    config, positions = scene.config, scene.positions
+    along, everywhere = line.along(positions[chosen]), line.along(positions)
+    start, seen = _seen(along, scene.observations.extent[chosen], config.max_extension + STEP)
+    solid, passed, passed_normal = _counts(line, start, len(seen), scene.node_poses, scene.beams)
+    near = np.abs(line.gap(positions)) < config.distance_tolerance
     walls = []
-    for first, last in _runs(glass):
-        low, high = start + first * _STEP, start + (last + 1) * _STEP
-        inside = chosen[(along >= low - 0.5 * _STEP) & (along <= high + 0.5 * _STEP)]
-        wall = _wall(line, low, high, inside, observations, float((seen[first : last + 1] > 0).sum()) * _STEP)
-        strip = np.abs(line.gap(positions)) < config.distance_tolerance
-        strip &= (everywhere >= low - _STEP) & (everywhere <= high + _STEP)
-        chance = 2.0 * math.radians(config.angle_tolerance_deg) / math.pi * int(strip.sum())
-        enough = len(inside) >= max(config.min_observations, config.min_excess * chance)
-        if enough and wall.nodes >= config.min_nodes and wall.probability >= config.min_probability:
+    for first, last in runs(glass_stretches(seen, solid, passed, passed_normal, config)):
+        low, high = start + first * STEP, start + (last + 1) * STEP
+        inside = chosen[(along >= low - 0.5 * STEP) & (along <= high + 0.5 * STEP)]
+        observed = float((seen[first : last + 1] > 0).sum()) * STEP
+        wall = _wall(line, low, high, inside, scene.observations, observed)
+        strip = near & (everywhere >= low - STEP) & (everywhere <= high + STEP)
+        if _is_enough(wall, int(strip.sum()), config):
             free[strip] = False
             walls.append(wall)
     return walls
+
+
+def _seen(along: FloatArray, extent: FloatArray, margin: float) -> tuple[float, NDArray[np.int64]]:
+    """Where the pieces of a line begin, m, and how many observations cover each of them."""
+    reach = np.maximum(extent, 0.5 * STEP)
+    start = float((along - reach).min()) - margin
+    seen = np.zeros(math.ceil((float((along + reach).max()) + margin - start) / STEP), dtype=np.int64)
+    for low, high in zip(along - reach - start, along + reach - start, strict=True):
+        seen[int(low / STEP) : int(high / STEP) + 1] += 1
+    return start, seen
+
+
+def _is_enough(wall: GlassWall, around: int, config: GlassWallConfig) -> bool:
+    """Whether a wall has more support than the observations `around` it would give it by chance."""
+    chance = 2.0 * math.radians(config.angle_tolerance_deg) / math.pi * around
+    return (
+        wall.observations >= max(config.min_observations, config.min_excess * chance)
+        and wall.nodes >= config.min_nodes
+        and wall.probability >= config.min_probability
+    )
 
 
 def _counts(
@@ -213,81 +227,10 @@ def _counts(
     everyone = np.arange(len(node_poses))
     for kind, on_line in ((beams.returns, solid), (beams.silent, nothing)):
         count_along_line(
-            node_poses, kind.sensors, kind.ends, kind.first, everyone, line.foot, line.direction, start, _STEP,
-            _SOLID_BAND, _BEYOND, _NORMAL_LIMIT, on_line, passed, normal,
+            node_poses, kind.sensors, kind.ends, kind.first, everyone, line.foot, line.direction, start,
+            STEP, _SOLID_BAND, _BEYOND, _NORMAL_LIMIT, on_line, passed, normal,
         )  # fmt: skip
     return solid, passed, normal
-
-
-def _bridged(
-    seen: NDArray[np.int64],
-    solid: NDArray[np.int64],
-    passed: NDArray[np.int64],
-    passed_normal: NDArray[np.int64],
-    config: GlassWallConfig,
-) -> NDArray[np.bool_]:
-    """Pieces of the line that are glass: observed, bridged, or up to the frame that holds them."""
-    observed = seen > 0
-    glass = observed.copy()
-    answers = int(seen[observed].sum())
-    # the share of beams at normal incidence that this glass answered, from the stretches where it did
-    rate = answers / (answers + int(passed_normal[observed].sum()))
-    opaque = ~observed & (solid >= 3) & (solid > passed)
-    for first, last in _runs(~observed):
-        inner = slice(first, last + 1)
-        if first == 0 or last == len(seen) - 1:
-            _extend(glass, opaque, passed, first, last, config)
-        elif _may_bridge(opaque[inner], passed[inner], passed_normal[inner], rate, config):
-            glass[inner] = True
-    return glass
-
-
-def _may_bridge(
-    opaque: NDArray[np.bool_],
-    passed: NDArray[np.int64],
-    passed_normal: NDArray[np.int64],
-    rate: float,
-    config: GlassWallConfig,
-) -> bool:
-    """Whether a gap between observed pieces is glass that nobody met at normal incidence."""
-    length = len(opaque) * _STEP
-    if length > config.max_gap:
-        return False
-    widest = max((last - first + 1 for first, last in _runs(opaque)), default=0) * _STEP
-    if widest > config.max_mullion:
-        return False
-    # glass that seldom answers even where it stands proves nothing by its silence
-    if rate > _RELIABLE and rate * int(passed_normal.sum()) > config.opening_evidence:
-        return False
-    silent = ~opaque & (passed == 0)
-    return bool(silent.sum() * _STEP <= max(config.max_mullion, 0.5 * length))
-
-
-def _extend(
-    glass: NDArray[np.bool_],
-    opaque: NDArray[np.bool_],
-    passed: NDArray[np.int64],
-    first: int,
-    last: int,
-    config: GlassWallConfig,
-) -> None:
-    """Carry a wall on to the frame next to it, when one is within reach and beams pass on the way."""
-    way = range(first, last + 1) if first > 0 else range(last, first - 1, -1)
-    reach: list[int] = []
-    for k in way:
-        if opaque[k]:
-            if len(reach) * _STEP <= config.max_extension:
-                glass[reach] = True
-            return
-        if passed[k] == 0:
-            return
-        reach.append(k)
-
-
-def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _wall(

@@ -46,7 +46,7 @@ def test_the_spike_at_normal_incidence_stands_far_above_the_halo():
     assert np.percentile(seen.intensities, 75) > 10_000
 
 
-@pytest.mark.parametrize(("ranges", "widest"), [((2.2, 2.8), 35), ((4.5, 5.5), 12), ((9, 11), 4)])
+@pytest.mark.parametrize(("ranges", "widest"), [((2.2, 2.8), 40), ((4.5, 5.5), 12), ((9, 11), 4)])
 def test_a_far_pane_answers_only_near_normal_incidence(ranges, widest):
     assert answered(facing(PANES, "utm30lx", ranges, (0.0, 0.3))) > 0.9
     assert answered(facing(PANES, "utm30lx", ranges, (widest, widest + 5))) < 0.03
@@ -82,13 +82,6 @@ def test_neighbouring_beams_of_a_pane_are_alike():
     seen = look(plan, "utm30lx", 1.5, 0.0, np.arange(70.0, 85.0, 0.25))
     steps = np.diff(np.log(seen.intensities))
     assert np.abs(steps).mean() < 0.08
-
-
-def test_panels_of_the_laboratory_are_all_above_the_threshold_of_the_paper():
-    for material in ("glass", "acrylic", "polycarbonate"):
-        for distance in (1.0, 2.0):
-            seen = facing(many(material), "ust10lx", (distance, distance), (0.0, 0.12), n=500)
-            assert np.median(seen.intensities) > 3000, (material, distance)
 
 
 def test_a_mullion_flashes_at_other_angles_than_its_panes():
@@ -145,17 +138,25 @@ def test_the_loss_grows_towards_grazing_incidence():
     assert level(80) < 0.4
 
 
-def test_at_grazing_incidence_a_pane_mirrors_the_other_wall():
+def test_at_grazing_incidence_a_pane_mirrors_the_end_of_the_corridor():
+    plan = plan_of(("clean_glass", 0, 0, 12, 0), ("plaster", 12, 0.1, 12, 2.4))
+    bearing = np.deg2rad(10.0)
+    seen = look(plan, "utm30lx", 5.0, 0.4, [-10.0] * 200)
+    assert set(seen.labels) == {GHOST}
+    assert seen.mirrored.all()
+    assert np.median(seen.ranges) == pytest.approx(7.0 / np.cos(bearing), abs=0.005)
+    assert set(seen.segment) == {1}
+    assert np.median(seen.along) == pytest.approx(7.0 * np.tan(bearing) - 0.4 - 0.1, abs=1e-4)
+
+
+def test_a_mirrored_wall_too_weak_for_the_lidar_is_not_seen():
     plan = plan_of(("clean_glass", 0, 0, 20, 0), ("plaster", 0, 2.4, 20, 2.4))
-    angle = 20.0
-    seen = look(plan, "utm30lx", 5.0, 0.4, [-angle] * 200)
-    expected = (0.4 + 2.4) / np.sin(np.deg2rad(angle))
-    assert set(seen.labels) <= {GHOST, NO_RETURN}
-    assert (seen.labels == GHOST).mean() > 0.9
-    ghosts = seen.labels == GHOST
-    assert seen.mirrored[ghosts].all()
-    assert np.median(seen.ranges[ghosts]) == pytest.approx(expected, abs=0.02)
-    assert set(seen.segment[ghosts]) == {1}
+    assert set(look(plan, "utm30lx", 5.0, 0.4, [-20.0] * 200).labels) == {NO_RETURN}
+
+
+def test_the_mirror_image_of_a_leaning_pane_is_not_in_the_plane_of_the_scan():
+    plan = plan_of(("clean_glass", 0, 0, 12, 0), ("plaster", 12, 0.1, 12, 2.4), lean_deg=14.0)
+    assert set(look(plan, "utm30lx", 5.0, 0.4, [-10.0] * 200).labels) == {NO_RETURN}
 
 
 def test_a_pane_seen_square_on_mirrors_nothing():
@@ -185,9 +186,11 @@ def glass_before_a_wall(gap):
 
 
 def test_a_time_of_flight_lidar_reports_the_first_echo_even_if_it_is_weaker():
-    seen = look(glass_before_a_wall(0.5), "utm30lx", 2.0, 0.0, np.arange(65.0, 75.0, 0.25))
+    seen = look(glass_before_a_wall(0.5), "utm30lx", 2.0, 0.0, np.arange(60.0, 70.0, 0.25))
+    unhindered = look(behind(1.5), "utm30lx", 2.0, 0.0, np.arange(60.0, 70.0, 0.25))
     assert (seen.labels == GLASS).all()
-    assert seen.intensities.max() < 0.5 * 5400 * 0.85
+    assert (unhindered.labels == GHOST).all() or (unhindered.labels == SOLID).all()
+    assert np.median(seen.intensities) < 0.6 * np.median(unhindered.intensities)
 
 
 def test_a_triangulating_lidar_reports_the_strongest_echo():

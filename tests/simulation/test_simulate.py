@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tiny_scene import scene
 
-from glassslam.errors import ConfigError
+from glassslam.errors import ConfigError, UsageError
 from glassslam.geometry import compose, transform_points
 from glassslam.records import LaserScan, Odometry
 from glassslam.simulation import Scene, find_scene, lidar, simulate
@@ -91,7 +91,7 @@ def test_a_path_through_a_wall_is_refused():
 
 
 def test_the_office_is_worth_mapping():
-    simulation = simulate(Scene.load(find_scene("office")))
+    simulation = simulate(Scene.load(find_scene("office")), scan_rate=1.0)
     assert 60.0 <= simulation.driven <= 100.0
     first, last = simulation.motion.poses[0, :2], simulation.motion.poses[-1, :2]
     assert np.hypot(*(last - first)) < 0.5
@@ -99,6 +99,22 @@ def test_the_office_is_worth_mapping():
     odometry = [r.pose for r in simulation.records() if isinstance(r, Odometry)]
     drift = np.hypot(*odometry[-1][:2])
     assert 0.3 < drift < 10.0, "without drift there is no loop to close"
+
+
+@pytest.mark.parametrize(("rate", "hint"), [(41.0, "at most 40"), (0.0, "above 0"), (-1.0, "above 0")])
+def test_a_rate_the_lidar_cannot_give_is_refused(rate, hint):
+    with pytest.raises(UsageError) as caught:
+        simulate(scene(), "ust10lx", scan_rate=rate)
+    assert caught.value.message == f"a ust10lx does not give {rate:g} scans per second"
+    assert hint in caught.value.hint
+
+
+def test_the_rate_of_a_scene_is_only_a_limit():
+    assert simulate(scene(scan_rate=10.0), "ust10lx").sensor.scan_period == pytest.approx(0.1)
+    assert simulate(scene(scan_rate=10.0), "rplidar").sensor.scan_period == pytest.approx(1 / 5.8)
+    assert simulate(scene(scan_rate=10.0), "ust10lx", scan_rate=20.0).sensor.scan_period == pytest.approx(
+        0.05
+    )
 
 
 def test_points_of_the_office_lie_on_its_walls():

@@ -25,7 +25,10 @@ def test_simulate_writes_the_bag_and_the_truth_and_says_so(room, tmp_path, capsy
     assert main(["simulate", str(room), "-o", str(bag), "--sensor", "rplidar"]) == 0
     out = capsys.readouterr().out
     assert "scans of a rplidar, 2.0 m in" in out
-    for name in ("room.bag", "room.bag.truth.tum", "room.bag.truth.json"):
+    for name in (
+        "room.bag",
+        *(f"room.bag.truth.{end}" for end in ("tum", "json", "labels.npz", "glass.geojson")),
+    ):
         assert f"wrote {tmp_path / 'out' / name}" in out
         assert (tmp_path / "out" / name).is_file()
 
@@ -36,6 +39,15 @@ def test_simulate_tells_scripts_in_json(room, tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert (told["scene"], told["sensor"], told["seed"], told["bag"]) == ("room", "lms200", 4, str(bag))
     assert told["scans"] == read_tum(told["true_trajectory"]).stamps.size
+
+
+def test_simulate_thins_the_scans_to_a_rate(room, tmp_path, capsys):
+    counts = []
+    for rate in ("10", "5"):
+        bag = tmp_path / f"{rate}.bag"
+        assert main(["simulate", str(room), "-o", str(bag), "--rate", rate, "--json"]) == 0
+        counts.append(json.loads(capsys.readouterr().out)["scans"])
+    assert counts[0] == pytest.approx(2 * counts[1], abs=1)
 
 
 def test_simulate_does_not_replace_a_bag_unasked(room, tmp_path, capsys):
@@ -51,7 +63,11 @@ def test_simulate_does_not_replace_a_bag_unasked(room, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["castle"], "error: no scene 'castle' (give the path of a scene file or one of: office"),
+        (["castle"], "error: no scene 'castle' (give the path of a scene file or one of: glass"),
+        (
+            ["office", "--rate", "50"],
+            "error: a ust10lx does not give 50 scans per second (choose a rate above 0, at most 40)",
+        ),
         (["office", "--sensor", "vlp16"], "error: no lidar 'vlp16' (known: ust10lx, "),
     ],
 )

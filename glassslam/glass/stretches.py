@@ -1,0 +1,98 @@
+"""Where along a line glass stands, by the observations on it and the beams through it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glassslam.config import GlassWallConfig
+
+STEP = 0.1
+"""Length of the pieces that lines are divided into, m."""
+
+_RELIABLE = 0.3
+_SOLID_RETURNS = 3
+
+
+def glass_stretches(
+    seen: NDArray[np.int64],
+    solid: NDArray[np.int64],
+    passed: NDArray[np.int64],
+    passed_normal: NDArray[np.int64],
+    config: GlassWallConfig,
+) -> NDArray[np.bool_]:
+    """Pieces of a line that are glass: observed, bridged, or up to the frame that holds them.
+
+    Parameters
+    ----------
+    seen : ndarray of int64, shape (b,)
+        Observations by piece of `STEP`; at least one piece has some.
+    solid, passed, passed_normal : ndarray of int64, shape (b,)
+        Returns on the line, beams through it, and beams through it at normal incidence, by piece.
+    config : GlassWallConfig
+        Tolerances.
+
+    Returns
+    -------
+    ndarray of bool, shape (b,)
+        True for glass.
+    """
+    observed = seen > 0
+    glass = observed.copy()
+    answers = int(seen[observed].sum())
+    # the share of beams at normal incidence that this glass answered, from the stretches where it did
+    rate = answers / (answers + int(passed_normal[observed].sum()))
+    opaque = ~observed & (solid >= _SOLID_RETURNS) & (solid > passed)
+    for first, last in runs(~observed):
+        inner = slice(first, last + 1)
+        if first == 0 or last == len(seen) - 1:
+            _extend(glass, opaque, passed, first, last, config)
+        elif _may_bridge(opaque[inner], passed[inner], passed_normal[inner], rate, config):
+            glass[inner] = True
+    return glass
+
+
+def _may_bridge(
+    opaque: NDArray[np.bool_],
+    passed: NDArray[np.int64],
+    passed_normal: NDArray[np.int64],
+    rate: float,
+    config: GlassWallConfig,
+) -> bool:
+    """Whether a gap between observed pieces is glass that nobody met at normal incidence."""
+    length = len(opaque) * STEP
+    if length > config.max_gap:
+        return False
+    widest = max((last - first + 1 for first, last in runs(opaque)), default=0) * STEP
+    if widest > config.max_mullion:
+        return False
+    # glass that seldom answers even where it stands proves nothing by its silence
+    if rate > _RELIABLE and rate * int(passed_normal.sum()) > config.opening_evidence:
+        return False
+    silent = ~opaque & (passed == 0)
+    return bool(silent.sum() * STEP <= max(config.max_mullion, 0.5 * length))
+
+
+def _extend(
+    glass: NDArray[np.bool_],
+    opaque: NDArray[np.bool_],
+    passed: NDArray[np.int64],
+    first: int,
+    last: int,
+    config: GlassWallConfig,
+) -> None:
+    """Carry a wall on to the frame next to it, when one is within reach and beams pass on the way."""
+    way = range(first, last + 1) if first > 0 else range(last, first - 1, -1)
+    reach: list[int] = []
+    for k in way:
+        if opaque[k]:
+            if len(reach) * STEP <= config.max_extension:
+                glass[reach] = True
+            return
+        if passed[k] == 0:
+            return
+        reach.append(k)
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
