@@ -144,6 +144,7 @@ def _panes(
         np.empty(ranges.size + 1, dtype=np.int64),
         np.empty(ranges.size),
         np.empty(ranges.size),
+        np.empty(ranges.size),
         np.empty((2, 4)),
         np.empty(PANE_COLUMNS),
         panes,

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from detectors.accelerate import kernel
 from detectors.detection import FloatArray, LabelArray
 from detectors.labels import NO_RETURN, SOLID
@@ -81,26 +83,46 @@ def count_shoulders(
 
 
 @kernel
-def outer_fall(angles: FloatArray, logs: FloatArray, used: int, faint: float) -> float:
-    """Fall of the logarithm of the level between the inner and the outer part of the shoulders; +inf unseen.
+def least_fall(angles: FloatArray, logs: FloatArray, used: int, faint: float, room: FloatArray) -> float:
+    """The smallest fall of the logarithm of the level over the shoulders; +inf where they are not seen.
 
-    Only faint returns count: a wall in the plane of a pane is no shoulder of it.
+    On either side haze falls from the begin of the shoulder to its end, as a dark wall beside a bright one
+    does not, and still over its outer half, as a polished surface does not. Medians of the faint returns are
+    compared: a bright wall in the plane of a pane is no shoulder of it. `angles` are signed; `room` holds as
+    many values as there are beams.
     """
-    brightest = math.log(faint)
-    inner = outer = 0.0
-    inside = outside = 0
+    limit = math.log(faint)
+    fall = math.inf
+    for sign in (-1.0, 1.0):
+        begin = _median_between(angles, logs, used, sign, SHOULDER_FROM, INNER_FROM, limit, room)
+        inner = _median_between(angles, logs, used, sign, INNER_FROM, INNER_TO, limit, room)
+        outer = _median_between(angles, logs, used, sign, OUTER_FROM, LOBE_TO, limit, room)
+        if math.isfinite(outer) and math.isfinite(begin):
+            fall = min(fall, begin - outer)
+        if math.isfinite(outer) and math.isfinite(inner):
+            fall = min(fall, inner - outer)
+    return fall
+
+
+@kernel
+def _median_between(
+    angles: FloatArray,
+    logs: FloatArray,
+    used: int,
+    sign: float,
+    low: float,
+    high: float,
+    limit: float,
+    room: FloatArray,
+) -> float:
+    count = 0
     for k in range(used):
-        if logs[k] >= brightest:
-            continue
-        if INNER_FROM < angles[k] < INNER_TO:
-            inner += logs[k]
-            inside += 1
-        elif OUTER_FROM < angles[k]:
-            outer += logs[k]
-            outside += 1
-    if inside < LEAST_OUTER or outside < LEAST_OUTER:
+        if low < sign * angles[k] < high and logs[k] < limit:
+            room[count] = logs[k]
+            count += 1
+    if count < LEAST_OUTER:
         return math.inf
-    return inner / inside - outer / outside
+    return float(np.median(room[:count]))
 
 
 @kernel
@@ -122,7 +144,8 @@ def fit_lobe(
     """Fit level = amplitude * exp(-decay * |angle|) robustly to the returns on a line.
 
     Returns the amplitude, the decay (1/rad), the spread of the logarithm and the number of beams. `angles`
-    and `logs` are room for as many values as there are beams.
+    and `logs`, room for as many values as there are beams, receive the signed angles to the normal and the
+    logarithms of the levels.
     """
     used = 0
     c = math.cos(normal)
@@ -131,10 +154,10 @@ def fit_lobe(
     for beam in range(first, last):
         if labels[beam] != SOLID:
             continue
-        away = abs(angle_min + angle_increment * beam - normal)
+        phi = angle_min + angle_increment * beam - normal
         behind = ranges[beam] * (cosines[beam] * c + sines[beam] * s) - distance
-        if CORE <= away <= LOBE_TO and abs(behind) <= tolerance:
-            angles[used] = away
+        if CORE <= abs(phi) <= LOBE_TO and abs(behind) <= tolerance:
+            angles[used] = phi
             logs[used] = math.log(max(levels[beam], DIMMEST))
             used += 1
     if used < 4:
@@ -146,15 +169,16 @@ def fit_lobe(
         n = sx = sy = sxx = sxy = deviation = 0.0
         for k in range(used):
             weight = 1.0
+            away = abs(angles[k])
             if step > 0:
-                residual = abs(logs[k] - intercept + decay * angles[k])
+                residual = abs(logs[k] - intercept + decay * away)
                 deviation += min(residual, 1.0)
                 weight = 1.0 / (1.0 + (residual / OUTLIER) ** 2)
             n += weight
-            sx += weight * angles[k]
+            sx += weight * away
             sy += weight * logs[k]
-            sxx += weight * angles[k] * angles[k]
-            sxy += weight * angles[k] * logs[k]
+            sxx += weight * away * away
+            sxy += weight * away * logs[k]
         variance = sxx - sx * sx / n
         if variance < 1e-9:
             return 0.0, 0.0, math.inf, used

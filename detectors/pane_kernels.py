@@ -5,7 +5,7 @@ import math
 from detectors.accelerate import kernel
 from detectors.detection import FloatArray, IntArray, LabelArray
 from detectors.labels import SOLID
-from detectors.lobe_kernels import ANSWERED, DIM, PASSED, TOTAL, count_shoulders, fit_lobe, outer_fall
+from detectors.lobe_kernels import ANSWERED, DIM, PASSED, TOTAL, count_shoulders, fit_lobe, least_fall
 from detectors.pane_lines import (
     FIRST_TOLERANCE,
     FIT_HALF_ANGLE,
@@ -104,7 +104,7 @@ def lobe_odds(
     if measured == 0:
         return -9.0
     odds += 1.5 if decay > weakest else 1.5 - 6.0 * (weakest - decay) / weakest
-    odds -= 3.0 * max(0.0, deviation - 0.35)
+    odds -= 6.0 * max(0.0, deviation - 0.35)
     # a lobe that would shine brighter than any pane at its unseen centre is the edge of something else
     odds -= 3.0 * max(0.0, math.log(max(brightest, 1e-3) / BRIGHTEST_HAZE))
     odds -= 60.0 * max(0.0, spread - 0.03)
@@ -114,10 +114,10 @@ def lobe_odds(
 
 @kernel
 def polish_odds(amplitude: float, fall: float) -> float:
-    """Log odds against a pane that shines like polished metal or lacquer: a mirror lobe over a dark floor.
+    """Log odds against a pane that shines like polished metal, lacquer or a bright strip on a dark wall.
 
-    The haze of a pane has `amplitude` at the normal and keeps falling to where it is no longer seen; the floor
-    stays as it is (`fall` is that of its logarithm).
+    The haze of a pane has `amplitude` at its normal and falls on to where it is no longer seen; a dark matte
+    floor stays as it is. `fall` is that of the logarithm over the shoulders.
     """
     level = min(STEADY_COST, FLOOR_WEIGHT * max(0.0, LEAST_FALL - fall))
     return level + DIM_WEIGHT * max(0.0, math.log(DIMMEST_HAZE / max(amplitude, 1e-3)))
@@ -167,6 +167,7 @@ def find_panes(
     dim: IntArray,
     angles: FloatArray,
     logs: FloatArray,
+    room: FloatArray,
     counts: FloatArray,
     row: FloatArray,
     panes: FloatArray,
@@ -233,7 +234,7 @@ def find_panes(
             logs,
         )
         odds = lobe_odds(counts, distance, amplitude, decay, deviation, spread, weakest_decay)
-        odds -= polish_odds(amplitude, outer_fall(angles, logs, lobe_beams, faint))
+        odds -= polish_odds(amplitude, least_fall(angles, logs, lobe_beams, faint, room))
         if odds < least_odds or lobe_beams < LEAST_FAINT:
             continue
         row[NORMAL] = normal

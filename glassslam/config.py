@@ -145,8 +145,8 @@ class OptimizationConfig(Section):
 class MapConfig(GridConfig):
     """The map that is written."""
 
-    hit_probability: Annotated[float, Field(gt=0.5, lt=1)] = 0.7
-    miss_probability: Annotated[float, Field(gt=0, lt=0.5)] = 0.4
+    hit_probability: Annotated[float, Field(gt=0.5, lt=1)] = 0.8
+    miss_probability: Annotated[float, Field(gt=0, lt=0.5)] = 0.33
 
 
 class GlassWallConfig(Section):
@@ -159,7 +159,7 @@ class GlassWallConfig(Section):
     min_probability: Probability = 0.9
     """Least probability of a wall."""
     min_excess: Positive = 2.0
-    """Least ratio of the observations that fit a wall to those that would by chance, from the strip around it."""
+    """Least ratio of the observations that fit a wall to those in its strip that would by chance."""
     distance_tolerance: Positive = 0.12
     """Largest distance of an observation from its wall, m."""
     angle_tolerance_deg: Positive = 7.0

@@ -100,9 +100,7 @@ def _read_json(path: str | Path, hint: str = "") -> Any:
 def _lines(content: Any, path: str | Path, kinds: frozenset[str]) -> list[Segments]:
     features = content.get("features") if isinstance(content, dict) else None
     if not isinstance(features, list):
-        raise EvaluationError(
-            f"{path} is no GeoJSON: it has no list of features", "expected a FeatureCollection"
-        )
+        raise EvaluationError(f"{path} is no GeoJSON", "expected a FeatureCollection of lines")
     described = [(_kind(feature), feature) for feature in features]
     if features and all(kind is None for kind, _ in described):
         names = " or ".join(sorted(kinds))
@@ -127,9 +125,7 @@ def _segments(feature: dict[str, Any], name: str) -> Segments:
     coordinates = geometry.get("coordinates")
     points = _points(coordinates) if isinstance(coordinates, list) else None
     if points is None or len(points) < 2:
-        raise EvaluationError(
-            f"{name} has no line of finite coordinates", "expected [[x, y], [x, y], ...] in m"
-        )
+        raise EvaluationError(f"{name} is no line of finite coordinates", "expected [[x, y], ...] in m")
     return np.array(list(itertools.pairwise(points)))
 
 

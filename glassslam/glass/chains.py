@@ -82,18 +82,37 @@ def chains(
 def straight_parts(
     positions: FloatArray, chain: NDArray[np.int64], distance: float
 ) -> list[NDArray[np.int64]]:
-    """A chain cut into parts that stay within `distance` (m) of a straight line each."""
+    """A chain cut into parts that stay within `distance` (m) of a straight line each.
+
+    Parts follow each other along the chain and share the piece at which it bends.
+
+    Parameters
+    ----------
+    positions : ndarray of float64, shape (k, 2)
+        Points on the surface, m.
+    chain : ndarray of int64, shape (n,)
+        Pieces that make the chain, at least one, in any order.
+    distance : float
+        Largest offset of the middle of neighbouring pieces from their line, m.
+    """
+    chain = np.sort(chain)
     points = positions[chain]
-    centre = points.mean(axis=0)
-    axis = np.linalg.svd(points - centre, full_matrices=False)[2][0]
+    centre, axis = _principal(points)
+    # the sign of a singular vector is arbitrary; the order of the pieces, and thus the cuts, must not be
+    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
     order = np.argsort((points - centre) @ axis, kind="stable")
     return _cut(positions, chain[order], distance)
 
 
+def _principal(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean of points and unit vector along their largest spread, shape (2,) each."""
+    centre = points.mean(axis=0)
+    return centre, np.asarray(np.linalg.svd(points - centre, full_matrices=False)[2][0])
+
+
 def _cut(positions: FloatArray, ordered: NDArray[np.int64], distance: float) -> list[NDArray[np.int64]]:
     points = positions[ordered]
-    centre = points.mean(axis=0)
-    axis = np.linalg.svd(points - centre, full_matrices=False)[2][0]
+    centre, axis = _principal(points)
     gaps = (points - centre) @ np.array([-axis[1], axis[0]])
     # single strays are left to the fit; a bend shows in the median of several neighbours
     smooth = np.abs(medfilt(gaps, 5)) if len(points) >= 5 else np.zeros(len(points))

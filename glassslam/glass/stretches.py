@@ -40,14 +40,25 @@ def glass_stretches(
     answers = int(seen[observed].sum())
     # the share of beams at normal incidence that this glass answered, from the stretches where it did
     rate = answers / (answers + int(passed_normal[observed].sum()))
-    opaque = ~observed & (solid >= _SOLID_RETURNS) & (solid > passed)
+    opaque = opaque_pieces(seen, solid, passed)
     for first, last in runs(~observed):
         inner = slice(first, last + 1)
-        if first == 0 or last == len(seen) - 1:
-            _extend(glass, opaque, passed, first, last, config)
-        elif _may_bridge(opaque[inner], passed[inner], passed_normal[inner], rate, config):
+        between = first > 0 and last < len(seen) - 1
+        if between and _may_bridge(opaque[inner], passed[inner], passed_normal[inner], rate, config):
             glass[inner] = True
+            continue
+        if first > 0:
+            glass[_way_to_frame(range(first, last + 1), opaque, passed, config.max_extension)] = True
+        if last < len(seen) - 1:
+            glass[_way_to_frame(range(last, first - 1, -1), opaque, passed, config.max_extension)] = True
     return glass
+
+
+def opaque_pieces(
+    seen: NDArray[np.int64], solid: NDArray[np.int64], passed: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Pieces of a line that stop beams and are not observed as glass, shape (b,)."""
+    return np.asarray((seen == 0) & (solid >= _SOLID_RETURNS) & (solid > passed))
 
 
 def _may_bridge(
@@ -71,25 +82,18 @@ def _may_bridge(
     return bool(silent.sum() * STEP <= max(config.max_mullion, 0.5 * length))
 
 
-def _extend(
-    glass: NDArray[np.bool_],
-    opaque: NDArray[np.bool_],
-    passed: NDArray[np.int64],
-    first: int,
-    last: int,
-    config: GlassWallConfig,
-) -> None:
-    """Carry a wall on to the frame next to it, when one is within reach and beams pass on the way."""
-    way = range(first, last + 1) if first > 0 else range(last, first - 1, -1)
+def _way_to_frame(
+    way: range, opaque: NDArray[np.bool_], passed: NDArray[np.int64], longest: float
+) -> list[int]:
+    """Pieces from a wall to the frame next to it; none when no frame is near or beams stop on the way."""
     reach: list[int] = []
     for k in way:
         if opaque[k]:
-            if len(reach) * STEP <= config.max_extension:
-                glass[reach] = True
-            return
+            return reach if len(reach) * STEP <= longest else []
         if passed[k] == 0:
-            return
+            return []
         reach.append(k)
+    return []
 
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

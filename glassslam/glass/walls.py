@@ -18,7 +18,7 @@ from glassslam.glass.chains import chains, straight_parts
 from glassslam.glass.evidence_kernels import count_along_line
 from glassslam.glass.lines import Line, fit_line, members
 from glassslam.glass.observations import GlassObservations
-from glassslam.glass.stretches import STEP, glass_stretches, runs
+from glassslam.glass.stretches import STEP, glass_stretches, opaque_pieces, runs
 from glassslam.records import Float32Array, FloatArray
 
 _SOLID_BAND = 0.1
@@ -183,15 +183,22 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
     """Walls on a line, where observations and beams agree on glass; what lies on them is no longer free."""
     config, positions = scene.config, scene.positions
     along, everywhere = line.along(positions[chosen]), line.along(positions)
-    start, seen = _seen(along, scene.observations.extent[chosen], config.max_extension + STEP)
+    reach = np.maximum(scene.observations.extent[chosen], 0.5 * STEP)
+    start, seen = _seen(along, reach, config.max_extension + STEP)
     solid, passed, passed_normal = _counts(line, start, len(seen), scene.node_poses, scene.beams)
+    posts = opaque_pieces(seen, solid, passed)
     near = np.abs(line.gap(positions)) < config.distance_tolerance
     walls = []
     for first, last in runs(glass_stretches(seen, solid, passed, passed_normal, config)):
         low, high = start + first * STEP, start + (last + 1) * STEP
-        inside = chosen[(along >= low - 0.5 * STEP) & (along <= high + 0.5 * STEP)]
-        observed = float((seen[first : last + 1] > 0).sum()) * STEP
-        wall = _wall(line, low, high, inside, scene.observations, observed)
+        inside = (along >= low - 0.5 * STEP) & (along <= high + 0.5 * STEP)
+        # a wall that no post holds ends with its last observation, not with the piece that lies in
+        if seen[first] > 0 and not posts[first - 1]:
+            low = max(low, float((along - reach)[inside].min()))
+        if seen[last] > 0 and not posts[last + 1]:
+            high = min(high, float((along + reach)[inside].max()))
+        observed = min(high - low, float((seen[first : last + 1] > 0).sum()) * STEP)
+        wall = _wall(line, low, high, chosen[inside], scene.observations, observed)
         strip = near & (everywhere >= low - STEP) & (everywhere <= high + STEP)
         if _is_enough(wall, int(strip.sum()), config):
             free[strip] = False
@@ -199,11 +206,10 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
     return walls
 
 
-def _seen(along: FloatArray, extent: FloatArray, margin: float) -> tuple[float, NDArray[np.int64]]:
+def _seen(along: FloatArray, reach: FloatArray, margin: float) -> tuple[float, NDArray[np.int64]]:
     """Where the pieces of a line begin, m, and how many observations cover each of them."""
-    reach = np.maximum(extent, 0.5 * STEP)
     start = float((along - reach).min()) - margin
-    seen = np.zeros(math.ceil((float((along + reach).max()) + margin - start) / STEP), dtype=np.int64)
+    seen = np.zeros(math.ceil((float((along + reach).max()) + margin - start) / STEP) + 1, dtype=np.int64)
     for low, high in zip(along - reach - start, along + reach - start, strict=True):
         seen[int(low / STEP) : int(high / STEP) + 1] += 1
     return start, seen

@@ -1,5 +1,6 @@
 """Chains of pieces that continue each other."""
 
+import itertools
 import math
 
 import numpy as np
@@ -127,7 +128,7 @@ def test_the_parts_of_a_curve_are_joined_and_straight():
     positions = bent(0.0, length=20.0, curve=0.002)
     parts = straight_parts(positions, np.arange(len(positions)), 0.07)
     assert len(parts) > 2
-    for before, after in zip(parts, parts[1:], strict=False):
+    for before, after in itertools.pairwise(parts):
         assert before[-1] == after[0]
     for part in parts:
         x, y = positions[part].T

