@@ -44,6 +44,10 @@ _choose_cache_folder()
 
 import numba  # noqa: E402  (the cache folder must be known before numba reads its configuration)
 
+# somebody may have imported numba before: it reads its environment only once
+_config: Any = numba.config
+_config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]
+
 
 def kernel(function: _F) -> _F:
     """Compile `function` in nopython mode with numpy error semantics, without the GIL, cached."""

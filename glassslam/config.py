@@ -154,7 +154,7 @@ class GlassWallConfig(Section):
 
     min_observations: Count = 3
     """Observations a wall rests on at least."""
-    min_nodes: Count = 2
+    min_nodes: Count = 5
     """Different nodes that made them, at least."""
     min_probability: Probability = 0.9
     """Least probability of a wall."""

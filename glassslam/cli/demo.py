@@ -13,6 +13,7 @@ EXAMPLES = """\
 """
 
 _SCENE = "office"
+_LIDAR = "ust10lx"
 
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Where everything is written.")]
 
@@ -29,11 +30,12 @@ def demo(output: Output = Path("demo_out")) -> int:
 
     bag, results = output / "demo.bag", output / "map"
     _check_own(output, bag)
-    simulation = simulate(Scene.load(find_scene(_SCENE)))
+    simulation = simulate(Scene.load(find_scene(_SCENE)), _LIDAR)
     written = record(simulation, bag)
     emit(describe(simulation, written) + "\n")
-    code = map_command([bag], output=results, overwrite=True)
+    code = map_command([bag], output=results, sensor=_LIDAR, overwrite=True)
     emit(_verdict(results / "trajectory.tum", written.true_trajectory))
+    emit(_glass_verdict(results / "glass.geojson", written.true_glass))
     emit(f"\nlook at {results / 'map.png'}\nnext: glassslam map YOUR.bag -o DIR\n")
     return code
 
@@ -59,4 +61,16 @@ def _verdict(estimate: Path, truth: Path) -> str:
     return (
         f"\nagainst the truth: {100 * shift.rmse:.1f} cm rms, {100 * shift.max:.1f} cm at most; "
         f"{turn.rmse:.2f} deg rms, over {errors.count} scans\n"
+    )
+
+
+def _glass_verdict(walls: Path, truth: Path) -> str:
+    from glassslam.evaluation.glass import evaluate_glass  # noqa: PLC0415
+    from glassslam.evaluation.glass_lines import read_glass_walls, read_true_glass  # noqa: PLC0415
+
+    errors = evaluate_glass(read_glass_walls(walls), read_true_glass(truth))
+    nearest = errors.within[0]
+    return (
+        f"glass: {nearest.found:.1f} of {errors.true_length:.1f} m found within "
+        f"{100 * nearest.tolerance:.0f} cm, {errors.false_length:.1f} m of false glass\n"
     )

@@ -8,6 +8,7 @@ import typer
 EXAMPLES = """\
   glassslam map run.bag                             results in run-map/
   glassslam map run.bag -o office --overwrite       replace earlier results
+  glassslam map run.bag --sensor ust10lx            find glass walls as well
   glassslam map part1.bag part2.bag -o office       recordings that follow each other
   glassslam map run.mcap --scan-topic /front/scan   choose among several lidars
   glassslam map run.bag --laser-pose 0.1,0,0        the laser sits 0.1 m ahead of the centre
@@ -35,6 +36,13 @@ Assignments = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="SECTION.NAME=VALUE", help="Change one parameter; may be repeated."),
 ]
+Sensor = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Look for glass with a lidar of this kind: utm30lx, ust10lx, tim781, lms511 or rplidar.",
+    ),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in DIR.")]
 ScanTopic = Annotated[str | None, typer.Option(help="Topic of the laser scans.", metavar="TOPIC")]
 OdomTopic = Annotated[str | None, typer.Option(help="Topic of the odometry; tf, or none.", metavar="TOPIC")]
@@ -59,6 +67,7 @@ def map_command(
     output: Output = None,
     config: ConfigFile = None,
     assignments: Assignments = None,
+    sensor: Sensor = None,
     overwrite: Overwrite = False,
     scan_topic: ScanTopic = None,
     odom_topic: OdomTopic = None,
@@ -79,11 +88,19 @@ def map_command(
     from glassslam.outputs import Stopwatch, check_directory  # noqa: PLC0415  (loads numpy)
 
     stopwatch = Stopwatch()
-    from glassslam.cli.settings import default_directory, parse_pose, resolve_config  # noqa: PLC0415
+    from glassslam.cli.settings import (  # noqa: PLC0415
+        default_directory,
+        parse_pose,
+        resolve_config,
+        sensor_assignments,
+    )
 
     directory = output or default_directory(recordings)
     check_directory(directory, overwrite=overwrite)
-    pose, resolved = parse_pose(laser_pose), resolve_config(config, assignments or ())
+    pose, resolved = (
+        parse_pose(laser_pose),
+        resolve_config(config, [*sensor_assignments(sensor), *(assignments or ())]),
+    )
     from glassslam.sources import SourceOptions  # noqa: PLC0415  (loads rosbags)
 
     options = SourceOptions(

@@ -35,6 +35,27 @@ def resolve_config(file: Path | None, assignments: Sequence[str]) -> Config:
     return Config.from_mapping(data, origin="--set")
 
 
+def sensor_assignments(sensor: str | None) -> list[str]:
+    """Assignments that look for glass with a lidar of a kind; none when no kind is named.
+
+    Cheap lidars show panes as narrow returns only; the others by their calibrated intensity.
+
+    Raises
+    ------
+    UsageError
+        The kind is not known.
+    """
+    if sensor is None:
+        return []
+    from detectors.profiles import PROFILES  # noqa: PLC0415  (loads numpy)
+
+    if sensor not in PROFILES:
+        raise UsageError(f"--sensor {sensor}: not known", f"known are {', '.join(PROFILES)}")
+    if sensor == "rplidar":
+        return ["glass.detector=narrow_return"]
+    return ["glass.detector=calibrated_peak", f"glass.sensor={sensor}"]
+
+
 def _assign(data: dict[str, Any], assignment: str) -> None:
     name, equals, text = assignment.partition("=")
     *sections, last = name.strip().split(".")

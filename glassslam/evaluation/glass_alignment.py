@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from glassslam.evaluation.glass_lines import Segments, distances, midpoints
-from glassslam.geometry import inverse, transform_points, wrap_angle
+from glassslam.geometry import compose, inverse, transform_points, wrap_angle
 from glassslam.records import FloatArray
 
 _LONGEST = 8
@@ -38,11 +38,15 @@ def best_alignment(walls: Segments, truth: Segments) -> FloatArray:
     """
     if len(walls) == 0 or len(truth) == 0:
         return np.zeros(3)
-    coarse, fine = _Cover(walls, truth, 5.0 * _STEP), _Cover(walls, truth, _STEP)
-    starts = sorted(_starts(walls, truth), key=lambda motion: -coarse(motion, _WIDTHS[0]))[:_REFINED]
-    near = _refine(fine, np.zeros(3))
-    far = max((_refine(fine, motion) for motion in starts), key=lambda motion: fine(motion, _WIDTHS[-1]))
-    return far if fine(far, _WIDTHS[-1]) > _CLEARLY * fine(near, _WIDTHS[-1]) else near
+    # turning about the middle of the walls keeps turn and shift apart, which the search needs
+    centre = walls.reshape(-1, 2).mean(axis=0)
+    centred = walls - centre
+    coarse, fine = _Cover(centred, truth, 5.0 * _STEP), _Cover(centred, truth, _STEP)
+    starts = sorted(_starts(centred, truth), key=lambda motion: -coarse(motion, _WIDTHS[0]))[:_REFINED]
+    near = _best(fine, [np.array([*centre, 0.0])])
+    far = _best(fine, starts)
+    best = far if fine(far, _WIDTHS[-1]) > _CLEARLY * fine(near, _WIDTHS[-1]) else near
+    return compose(best, np.array([*-centre, 0.0]))
 
 
 class _Cover:
@@ -51,6 +55,7 @@ class _Cover:
     def __init__(self, walls: Segments, truth: Segments, step: float) -> None:
         self._walls, self._truth = walls, truth
         self._wall_points, self._wall_lengths = midpoints(walls, step)
+        self.radius = max(1.0, float(np.hypot(*self._wall_points.T).max()))
         self._true_points, self._true_lengths = midpoints(truth, step)
 
     def __call__(self, motion: FloatArray, width: float) -> float:
@@ -89,16 +94,22 @@ def _onto(point: FloatArray, target: FloatArray, angle: float) -> FloatArray:
     return np.array([x, y, float(wrap_angle(angle))])
 
 
-def _refine(cover: _Cover, motion: FloatArray) -> FloatArray:
+def _best(cover: _Cover, starts: list[FloatArray]) -> FloatArray:
+    """The best motion reached from any start, by a search that begins wide or narrow."""
+    ends = [_refine(cover, start, _WIDTHS[k:]) for start in starts for k in range(len(_WIDTHS))]
+    return max(ends, key=lambda motion: cover(motion, _WIDTHS[-1]))
+
+
+def _refine(cover: _Cover, motion: FloatArray, widths: tuple[float, ...]) -> FloatArray:
     from scipy.optimize import minimize  # noqa: PLC0415  (other evaluations need not wait for it)
 
-    for width in _WIDTHS:
+    for width in widths:
 
         def missing(trial: FloatArray, width: float = width) -> float:
             return -cover(trial, width)
 
         # a simplex as large as the width: the cover is flat where the glass is far from the truth
-        simplex = motion + np.vstack((np.zeros(3), np.diag([width, width, 0.1 * width])))
+        simplex = motion + np.vstack((np.zeros(3), np.diag([width, width, width / cover.radius])))
         options: Any = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-4, "maxiter": 200}
         motion = np.asarray(minimize(missing, motion, method="Nelder-Mead", options=options).x)
     return np.array([motion[0], motion[1], float(wrap_angle(motion[2]))])

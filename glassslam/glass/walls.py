@@ -7,68 +7,26 @@ pass at normal incidence more often than glass lets them, there is an opening.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.config import GlassWallConfig
+from glassslam.glass.beams import BeamEvidence, Beams
 from glassslam.glass.chains import chains, straight_parts
 from glassslam.glass.evidence_kernels import count_along_line
 from glassslam.glass.lines import Line, fit_line, members
 from glassslam.glass.observations import GlassObservations
 from glassslam.glass.stretches import STEP, glass_stretches, opaque_pieces, runs
-from glassslam.records import Float32Array, FloatArray
+from glassslam.records import FloatArray
+
+__all__ = ["BeamEvidence", "Beams", "GlassWall", "fit_walls"]
 
 _SOLID_BAND = 0.1
 _BEYOND = 0.25
 _NORMAL_LIMIT = math.radians(4.0)
 _ROUNDS = 6
-
-
-@dataclass(frozen=True, slots=True)
-class Beams:
-    """End points of the beams of all nodes, packed.
-
-    Attributes
-    ----------
-    sensors : ndarray of float64, shape (n, 2)
-        Position of the laser in the frame of the base at each node, m.
-    ends : ndarray of float32, shape (m, 2)
-        End points in the frames of the bases of their nodes, m.
-    first : ndarray of int64, shape (n + 1,)
-        Row of `ends` where each node begins.
-    """
-
-    sensors: FloatArray
-    ends: Float32Array
-    first: NDArray[np.int64]
-
-    @classmethod
-    def pack(cls, sensors: Sequence[FloatArray], ends: Sequence[Float32Array]) -> "Beams":
-        """Pack the end points (m_i, 2) of every node."""
-        lengths = [len(points) for points in ends]
-        joined = np.concatenate(ends) if ends else np.empty((0, 2), np.float32)
-        return cls(
-            np.array(sensors).reshape(-1, 2),
-            joined,
-            np.concatenate(([0], np.cumsum(lengths))).astype(np.int64),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class BeamEvidence:
-    """What all beams of a run tell about free space and surfaces.
-
-    Attributes
-    ----------
-    returns, silent : Beams
-        Beams that came back, ending on a surface, and beams without echo, ending in free space.
-    """
-
-    returns: Beams
-    silent: Beams
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,16 +125,23 @@ def _robust_line(
         line = fit_line(
             positions[kept], normals[kept], observations.position_sigma[kept], observations.normal_sigma[kept]
         )
-        near = chosen[
-            members(
-                line, positions[chosen], normals[chosen], config.distance_tolerance,
-                math.radians(config.angle_tolerance_deg),
-            )
-        ]  # fmt: skip
+        near = _on_line(line, chosen, positions, normals, config)
         if len(near) < 2 or np.array_equal(near, kept):
             break
         kept = near
     return line
+
+
+def _on_line(
+    line: Line,
+    chosen: NDArray[np.int64],
+    positions: FloatArray,
+    normals: FloatArray,
+    config: GlassWallConfig,
+) -> NDArray[np.int64]:
+    """Those of the chosen observations that lie on a line and are turned as it is."""
+    angle = math.radians(config.angle_tolerance_deg)
+    return chosen[members(line, positions[chosen], normals[chosen], config.distance_tolerance, angle)]
 
 
 def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scene: _Scene) -> list[GlassWall]:
@@ -188,6 +153,8 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
     solid, passed, passed_normal = _counts(line, start, len(seen), scene.node_poses, scene.beams)
     posts = opaque_pieces(seen, solid, passed)
     near = np.abs(line.gap(positions)) < config.distance_tolerance
+    # a map that is not perfect bends: pieces off the line still tell where the wall goes on, but do not count
+    on_line = np.isin(chosen, _on_line(line, chosen, positions, scene.normals, config))
     walls = []
     for first, last in runs(glass_stretches(seen, solid, passed, passed_normal, config)):
         low, high = start + first * STEP, start + (last + 1) * STEP
@@ -198,7 +165,7 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
         if seen[last] > 0 and not posts[last + 1]:
             high = min(high, float((along + reach)[inside].max()))
         observed = min(high - low, float((seen[first : last + 1] > 0).sum()) * STEP)
-        wall = _wall(line, low, high, chosen[inside], scene.observations, observed)
+        wall = _wall(line, low, high, chosen[inside & on_line], scene.observations, observed)
         strip = near & (everywhere >= low - STEP) & (everywhere <= high + STEP)
         if _is_enough(wall, int(strip.sum()), config):
             free[strip] = False

@@ -9,29 +9,37 @@ from detectors.calibration import Calibration
 from detectors.detection import Detection
 from detectors.intensity_peak import intensity_peak, wang_wang
 from detectors.narrow_return import narrow_return
+from detectors.profiles import PROFILES, load_profile
 from glassslam.config import GlassConfig
+from glassslam.errors import ConfigError
 from glassslam.records import LaserScan
 
 Detector: TypeAlias = Callable[[LaserScan], Detection | None]
 
 
-def make_detector(config: GlassConfig, calibration: Calibration | None = None) -> Detector | None:
+def make_detector(config: GlassConfig) -> Detector | None:
     """Function from a scan to what is found in it; None when glass is not looked for.
 
-    Parameters
-    ----------
-    config : GlassConfig
-        Which detector, and its thresholds.
-    calibration : Calibration, optional
-        Of the sensor; `calibrated_peak` needs it.
+    Raises
+    ------
+    ConfigError
+        `calibrated_peak` without a shipped calibration of that name.
     """
     if config.detector == "off":
         return None
     if config.detector == "narrow_return":
         return _narrow
     if config.detector == "calibrated_peak":
-        return None if calibration is None else partial(_calibrated, calibration)
+        return partial(_calibrated, _calibration(config.sensor))
     return partial(_peak, config)
+
+
+def _calibration(sensor: str) -> Calibration:
+    if sensor not in PROFILES:
+        raise ConfigError(
+            f"glass.sensor: no calibration named {sensor!r} is shipped", f"known are {', '.join(PROFILES)}"
+        )
+    return load_profile(sensor)
 
 
 def _narrow(scan: LaserScan) -> Detection | None:

@@ -71,7 +71,10 @@ def test_version(capsys):
         (["zzz"], "error: there is no command 'zzz' (see glassslam --help)"),
         (["map"], "error: Missing argument 'RECORDING...' (see glassslam map --help)"),
         (["--nonsense"], "error: No such option: --nonsense (see glassslam --help)"),
-        (["evaluate", "x.tum"], "error: nothing to compare with (give --relations FILE, --trajectory TUM or --glass FILE)"),
+        (
+            ["evaluate", "x.tum"],
+            "error: nothing to compare with (give --relations FILE, --trajectory TUM or --glass FILE)",
+        ),
     ],
 )
 def test_wrong_usage_is_one_line_and_code_2(capsys, words, line):

@@ -26,7 +26,7 @@ def wall(distance=1.2, half_deg=90.0, normal=0.0, level=1.0):
 
 
 def pane(distance=1.2, half_deg=90.0, normal=0.0, seed=0, noise=0.01, behind=np.inf, reach_deg=28.0):
-    """A pane as in a real corridor: haze falling by half every 5.3 deg, a mirror peak, nothing beyond 28 deg."""
+    """A pane as in a real corridor: haze that halves every 5.3 deg, a mirror peak, an end to both."""
     angles = bearings(half_deg) - normal
     random = np.random.default_rng(seed)
     answers = np.abs(angles) < math.radians(reach_deg)

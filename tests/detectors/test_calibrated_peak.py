@@ -95,6 +95,13 @@ def test_a_mullion_before_the_pane_is_solid():
     assert (found.labels[inside(13, 20)] == GLASS).mean() > 0.95
 
 
+def test_a_frame_flush_with_the_pane_is_too_bright_to_be_glass():
+    frame = inside(14, 17)
+    found = detect(replaced(pane(1.2), wall(1.2), frame))
+    assert (found.labels[frame] == SOLID).all()
+    assert (found.labels[inside(18, 24)] == GLASS).mean() > 0.95
+
+
 def test_a_mullion_that_hides_the_foot_does_not_hide_the_pane():
     found = detect(replaced(pane(1.2), wall(1.12, level=2.0), inside(-2, 2)))
     assert len(found) > 0

@@ -98,7 +98,9 @@ def naive_peaks(intensities, labels, thresh, grad, width):
     steps = range(1, value.size)
     valid = [p for p in steps if INVALID not in (labels[p], labels[p - 1])]
     rises = [p for p in valid if value[p] >= thresh and value[p] - value[p - 1] >= grad]
-    falls = [p for p in valid if value[p - 1] >= thresh and value[p - 1] - value[p] >= grad and p not in rises]
+    falls = [
+        p for p in valid if value[p - 1] >= thresh and value[p - 1] - value[p] >= grad and p not in rises
+    ]
     pairs = []
     for h in rises:
         after = [p for p in falls if p > h]

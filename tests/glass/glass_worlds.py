@@ -9,7 +9,7 @@ from glassslam.geometry import compose, inverse, transform_points
 from glassslam.glass.observations import GlassObservations
 from glassslam.glass.walls import BeamEvidence, Beams, fit_walls
 
-CONFIG = GlassWallConfig()
+CONFIG = GlassWallConfig(min_nodes=2)
 
 
 class World:
