@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import glassslam as gs
 from glassslam.cli import main as glassslam
-from glassslam.evaluation import align, associate
+from glassslam.evaluation import align, associate, read_glass_walls
 from glassslam.geometry import compose
 from glassslam.records import FloatArray
 
@@ -23,7 +23,7 @@ SCALE = 18.0
 """Pixels per metre."""
 FREE, UNKNOWN, WALL, INK = (255, 255, 255), (232, 232, 232), (40, 40, 40), (70, 70, 70)
 # Blue, green, red: the order of OpenCV.
-DRIFTING, FOUND = (40, 120, 235), (190, 100, 20)
+DRIFTING, FOUND, GLASS = (40, 120, 235), (190, 100, 20), (170, 190, 0)
 
 Image = NDArray[np.uint8]
 
@@ -76,6 +76,14 @@ def draw_path(image: Image, poses: FloatArray, corner: FloatArray, colour: tuple
     )
 
 
+def draw_glass(image: Image, walls: Path, corner: FloatArray) -> None:
+    """Draw the glass walls of a results directory."""
+    for wall in read_glass_walls(walls):
+        for ends in wall:
+            (x0, y0), (x1, y1) = to_pixels(ends, corner, image.shape[0]).tolist()
+            cv2.line(image, (x0, y0), (x1, y1), GLASS, 4, cv2.LINE_AA)
+
+
 def titled(image: Image, title: str) -> Image:
     """Add a line of text above."""
     strip: Image = np.full((30, image.shape[1], 3), 255, dtype=np.uint8)
@@ -93,12 +101,19 @@ def draw(demo: Path) -> Image:
     draw_path(raw, path, corner, DRIFTING)
     trajectory = gs.read_tum(demo / "map" / "trajectory.tum")
     found = finished_map(demo, shape)
+    draw_glass(found, demo / "map" / "glass.geojson", corner)
     draw_path(found, trajectory.poses, corner, FOUND)
     estimated, true = associate(trajectory, gs.read_tum(demo / "demo.bag.truth.tum"))
     off = compose(align(estimated, true), estimated)[:, :2] - true[:, :2]
     error = 100.0 * float(np.sqrt((off**2).sum(axis=1).mean()))
     gap: Image = np.full((shape[0] + 30, 16, 3), 255, dtype=np.uint8)
-    return np.hstack((titled(raw, "odometry alone"), gap, titled(found, f"glassslam: {error:.1f} cm rms")))
+    return np.hstack(
+        (
+            titled(raw, "odometry alone"),
+            gap,
+            titled(found, f"glassslam: {error:.1f} cm rms, glass walls in green"),
+        )
+    )
 
 
 def main() -> None:
