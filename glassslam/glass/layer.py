@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.glass.observations import GlassObservations
-from glassslam.glass.walls import GlassWall
 from glassslam.records import Float32Array, FloatArray
+
+if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
+    from glassslam.glass.observations import GlassObservations
+    from glassslam.glass.walls import GlassWall
 
 GLASS_PROBABILITY = 0.98
 """P(occupied) of the cells of a glass wall: no robot should drive there."""
@@ -30,14 +33,14 @@ class GlassLayer:
         Their surface normals in the map frame, rad.
     """
 
-    walls: tuple[GlassWall, ...]
-    observations: GlassObservations
+    walls: "tuple[GlassWall, ...]"
+    observations: "GlassObservations"
     positions: FloatArray
     normals: FloatArray
 
 
 def wall_cells(
-    walls: Sequence[GlassWall], shape: tuple[int, int], origin: tuple[float, float], resolution: float
+    walls: "Sequence[GlassWall]", shape: tuple[int, int], origin: tuple[float, float], resolution: float
 ) -> NDArray[np.bool_]:
     """Cells of a grid that walls run through, shape (rows, columns)."""
     mask = np.zeros(shape, dtype=bool)

@@ -3,10 +3,12 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from glassslam.glass.layer import GlassLayer
-from glassslam.glass.walls import GlassWall
+
+if TYPE_CHECKING:
+    from glassslam.glass.walls import GlassWall
 
 
 def write_glass(layer: GlassLayer, path: Path) -> Path:
@@ -34,7 +36,7 @@ def _metres(point: Any) -> list[float]:
     return [round(float(value), 4) for value in point]
 
 
-def _wall(number: int, wall: GlassWall) -> dict[str, Any]:
+def _wall(number: int, wall: "GlassWall") -> dict[str, Any]:
     return _feature(
         "wall",
         "LineString",

@@ -1,17 +1,20 @@
 """Glass seen along the way: every scan is looked at, every observation bound to a node."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from detectors.detection import Detection
 from glassslam.config import GlassConfig
 from glassslam.geometry import between, compose, transform_points, wrap_angle
 from glassslam.glass.layer import GlassLayer
-from glassslam.glass.observations import GlassObservations
-from glassslam.glass.walls import BeamEvidence, Beams, fit_walls
 from glassslam.records import FloatArray, LaserScan
-from glassslam.slam.glass_detectors import Detector, make_detector
 from glassslam.slam.local import LocalResult
 from glassslam.slam.node import Node
+
+if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
+    from detectors.detection import Detection
+    from glassslam.glass.observations import GlassObservations
+    from glassslam.slam.glass_detectors import Detector
 
 _COLUMNS = 10
 
@@ -30,7 +33,7 @@ class GlassWatch:
     def __init__(self, config: GlassConfig, base_from_laser: FloatArray) -> None:
         self._config = config
         self._base_from_laser = base_from_laser
-        self._detect: Detector | None = make_detector(config)
+        self._detect = _detector(config)
         self._node = -1
         self._node_pose = np.zeros(3)
         self._nodes: list[np.ndarray] = []
@@ -53,8 +56,10 @@ class GlassWatch:
             self._rows.append(_rows(found, compose(node_from_base, self._base_from_laser)))
             self._nodes.append(np.full(len(found), self._node, dtype=np.int64))
 
-    def observations(self) -> GlassObservations:
+    def observations(self) -> "GlassObservations":
         """Everything found so far."""
+        from glassslam.glass.observations import GlassObservations  # noqa: PLC0415
+
         if not self._rows:
             return GlassObservations.empty()
         table = np.concatenate(self._rows)
@@ -68,6 +73,9 @@ class GlassWatch:
         """Walls and observations at the optimised poses of the nodes, shape (n, 3); None when off."""
         if self._detect is None:
             return None
+        from glassslam.glass.beams import BeamEvidence, Beams  # noqa: PLC0415
+        from glassslam.glass.walls import fit_walls  # noqa: PLC0415
+
         found = self.observations()
         sensors = [node.sensor for node in nodes]
         beams = BeamEvidence(
@@ -80,7 +88,15 @@ class GlassWatch:
         )
 
 
-def _rows(found: Detection, node_from_laser: FloatArray) -> FloatArray:
+def _detector(config: GlassConfig) -> "Detector | None":
+    if config.detector == "off":
+        return None
+    from glassslam.slam.glass_detectors import make_detector  # noqa: PLC0415
+
+    return make_detector(config)
+
+
+def _rows(found: "Detection", node_from_laser: FloatArray) -> FloatArray:
     """Observations of one scan in the frame of a node, one row each."""
     rows = np.empty((len(found), _COLUMNS))
     ends = found.range[:, None] * np.stack((np.cos(found.bearing), np.sin(found.bearing)), axis=1)
