@@ -1,4 +1,4 @@
-"""A growable probability grid with odds updates (Hess et al. 2016, section IV; METHODS.md, section 0)."""
+"""A growable probability grid with odds updates (Hess et al. 2016, section IV)."""
 
 from typing import Any
 

@@ -49,7 +49,7 @@ def match_scan(
     """Pose of least cost near a prediction.
 
     Minimises w_occ^2 / n * sum_k (1 - M_smooth(T h_k))^2 + w_t^2 |t - t_0|^2 + w_r^2 (theta - theta_0)^2
-    (METHODS.md, section 0); residuals and derivatives are modelled in CasADi (`matching/model.py`).
+    (Hess et al. 2016, section IV-C); residuals and derivatives are modelled in CasADi (`matching/model.py`).
 
     Parameters
     ----------

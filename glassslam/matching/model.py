@@ -34,7 +34,7 @@ def surface_derivatives(u: ca.SX, v: ca.SX, cells: ca.SX) -> ca.SX:
 
 
 def occupied_space_function() -> ca.Function:
-    """Residual 1 - M_smooth(T h) of one point h and its derivatives by the pose T (METHODS.md, section 0).
+    """Residual 1 - M_smooth(T h) of one point h and its derivatives by the pose T (Hess et al. 2016, IV-C).
 
     `turned` is R h, the point turned by the heading of the pose; (u, v) is T h from the centre of
     a cell, in cells; `c[4 j + i]` is the probability of the cell i - 1 columns and j - 1 rows

@@ -64,7 +64,7 @@ def prepare(
 
 
 def thin(points: FloatArray, edge: float) -> FloatArray:
-    """The first point of every voxel of an edge length, m; order kept (METHODS.md, section 0)."""
+    """The first point of every voxel of an edge length, m; order kept (as Cartographer's voxel filter)."""
     if edge <= 0 or len(points) == 0:
         return points
     return points[voxel_filter(points, edge)]
