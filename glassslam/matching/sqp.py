@@ -15,6 +15,7 @@ import numpy as np
 from glassslam.matching.kernels import objective
 from glassslam.matching.problem import MatchProblem
 from glassslam.records import FloatArray
+from glassslam.symbolic.callback import SolverCallback, write
 
 _SOLVERS_KEPT = 8
 _thread = local()
@@ -46,7 +47,7 @@ class SqpSolver:
         self._evaluation = _Evaluation()
         # the solver does not keep its callbacks alive
         self._callbacks = (
-            _Cost(self._evaluation), _Derivatives(self._evaluation), _Hessian(self._evaluation),
+            _Cost(self._evaluation, 3), _Derivatives(self._evaluation, 3), _Hessian(self._evaluation, 3),
         )  # fmt: skip
         cost, derivatives, hessian = self._callbacks
         x = ca.MX.sym("x", 3)
@@ -116,33 +117,7 @@ class _Evaluation:
         return self._values
 
 
-class _Callback(ca.Callback):
-    """A function (x, p, ...) of the solver computed in its own memory."""
-
-    inputs: tuple[str, ...] = ("x", "p")
-    outputs: tuple[str, ...] = ("f",)
-
-    def __init__(self, evaluation: _Evaluation) -> None:
-        super().__init__()
-        self.evaluation = evaluation
-        self.construct(type(self).__name__.strip("_").lower(), {})
-
-    def get_n_in(self) -> int:
-        return len(self.inputs)
-
-    def get_n_out(self) -> int:
-        return len(self.outputs)
-
-    def get_name_in(self, index: int) -> str:
-        return self.inputs[index]
-
-    def get_name_out(self, index: int) -> str:
-        return self.outputs[index]
-
-    def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        rows = {"x": 3, "p": 0, "lam_f": 1, "lam_g": 0}[self.inputs[index]]
-        return ca.Sparsity.dense(rows, 0 if self.inputs[index] == "p" else 1)
-
+class _Callback(SolverCallback[_Evaluation]):
     def get_sparsity_out(self, index: int) -> ca.Sparsity:
         sparsity = {
             "f": ca.Sparsity.dense(1, 1),
@@ -153,13 +128,10 @@ class _Callback(ca.Callback):
         }
         return sparsity[self.outputs[index]]
 
-    def has_eval_buffer(self) -> bool:
-        return True
-
 
 class _Cost(_Callback):
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
-        _write(results[0], self.evaluation.at(arguments[0])[:1])
+        write(results[0], self.evaluation.at(arguments[0])[:1])
         return 0
 
     def has_jacobian(self) -> bool:
@@ -169,7 +141,7 @@ class _Cost(_Callback):
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]
     ) -> ca.Function:
         """Jacobian as CasADi's calculus wants it: asked for when a solver is built, not when it runs."""
-        self._gradient = _Derivatives(self.evaluation)
+        self._gradient = _Derivatives(self.evaluation, 3)
         x, p, f = ca.MX.sym("x", 3), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
         row = self._gradient(x, p)[1].T
         return ca.Function(name, [x, p, f], [row, ca.MX(1, 0)], inputs, outputs, options)
@@ -180,8 +152,8 @@ class _Derivatives(_Callback):
 
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
         values = self.evaluation.at(arguments[0])
-        _write(results[0], values[:1])
-        _write(results[1], values[1:4])
+        write(results[0], values[:1])
+        write(results[1], values[1:4])
         return 0
 
 
@@ -191,11 +163,5 @@ class _Hessian(_Callback):
 
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
         factor = np.frombuffer(arguments[2], dtype=np.float64)[0]
-        _write(results[0], factor * self.evaluation.at(arguments[0])[4:])
+        write(results[0], factor * self.evaluation.at(arguments[0])[4:])
         return 0
-
-
-def _write(buffer: Any, values: FloatArray) -> None:
-    # an output nobody asked for has no memory
-    if buffer is not None:
-        np.frombuffer(buffer, dtype=np.float64)[:] = values

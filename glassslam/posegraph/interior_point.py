@@ -11,6 +11,7 @@ from glassslam.posegraph.levenberg_marquardt import Solution
 from glassslam.posegraph.structure import Structure
 from glassslam.posegraph.system import System
 from glassslam.records import FloatArray
+from glassslam.symbolic.callback import SolverCallback, read, write
 
 
 def minimise(system: System, poses: FloatArray, max_iterations: int, tolerance: float) -> Solution:
@@ -23,8 +24,9 @@ def minimise(system: System, poses: FloatArray, max_iterations: int, tolerance: 
     if system.size == 0:
         return Solution(poses, 0, initial, initial, True)
     evaluation = _Evaluation(system, poses)
-    cost, gradient, hessian = _Cost(evaluation), _Gradient(evaluation), _Hessian(evaluation)
-    x = ca.MX.sym("x", 3 * system.size)
+    size = 3 * system.size
+    cost, gradient, hessian = _Cost(evaluation, size), _Gradient(evaluation, size), _Hessian(evaluation, size)
+    x = ca.MX.sym("x", size)
     # a callback cannot be the problem itself, an expression that calls it can
     problem = {"x": x, "f": cost(x, ca.DM(0, 0))}
     options = _options(max_iterations, tolerance) | {"grad_f": gradient, "hess_lag": hessian}
@@ -79,44 +81,13 @@ class _Evaluation:
         return self._cost
 
 
-class _Callback(ca.Callback):
-    """A function (x, p, ...) of the solver computed in its own memory."""
-
-    inputs: tuple[str, ...] = ("x", "p")
-    outputs: tuple[str, ...] = ("f",)
-
-    def __init__(self, evaluation: _Evaluation) -> None:
-        super().__init__()
-        self.evaluation = evaluation
-        self.construct(type(self).__name__.strip("_").lower(), {})
-
-    def get_n_in(self) -> int:
-        return len(self.inputs)
-
-    def get_n_out(self) -> int:
-        return len(self.outputs)
-
-    def get_name_in(self, index: int) -> str:
-        return self.inputs[index]
-
-    def get_name_out(self, index: int) -> str:
-        return self.outputs[index]
-
-    def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        rows = {"x": 3 * self.evaluation.system.size, "p": 0, "lam_f": 1, "lam_g": 0}
-        return ca.Sparsity.dense(rows[self.inputs[index]], 0 if self.inputs[index] == "p" else 1)
-
-    def has_eval_buffer(self) -> bool:
-        return True
-
-
-class _Cost(_Callback):
+class _Cost(SolverCallback[_Evaluation]):
     def get_sparsity_out(self, index: int) -> ca.Sparsity:  # noqa: ARG002
         return ca.Sparsity.dense(1, 1)
 
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
         evaluation = self.evaluation
-        _write(results[0], evaluation.system.cost(evaluation.placed(_read(arguments[0]))))
+        write(results[0], evaluation.system.cost(evaluation.placed(read(arguments[0]))))
         return 0
 
     def has_jacobian(self) -> bool:
@@ -126,49 +97,38 @@ class _Cost(_Callback):
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]
     ) -> ca.Function:
         """Jacobian as CasADi's calculus wants it, from the gradient callback."""
-        self._gradient = _Gradient(self.evaluation)
-        x, p, f = ca.MX.sym("x", 3 * self.evaluation.system.size), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
+        self._gradient = _Gradient(self.evaluation, self.variables)
+        x, p, f = ca.MX.sym("x", self.variables), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
         row = self._gradient(x, p)[1].T
         return ca.Function(name, [x, p, f], [row, ca.MX(1, 0)], inputs, outputs, options)
 
 
-class _Gradient(_Callback):
+class _Gradient(SolverCallback[_Evaluation]):
     outputs = ("f", "grad_f_x")
 
     def get_sparsity_out(self, index: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(1 if index == 0 else 3 * self.evaluation.system.size, 1)
+        return ca.Sparsity.dense(1 if index == 0 else self.variables, 1)
 
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
-        _write(results[0], self.evaluation.linearised(_read(arguments[0])))
-        _write(results[1], self.evaluation.system.gradient.ravel())
+        write(results[0], self.evaluation.linearised(read(arguments[0])))
+        write(results[1], self.evaluation.system.gradient.ravel())
         return 0
 
 
-class _Hessian(_Callback):
+class _Hessian(SolverCallback[_Evaluation]):
     inputs = ("x", "p", "lam_f", "lam_g")
     outputs = ("triu_hess_gamma_x_x",)
 
     def get_sparsity_out(self, index: int) -> ca.Sparsity:  # noqa: ARG002
         starts, rows, _ = self.evaluation.entries
-        size = 3 * self.evaluation.system.size
-        return ca.Sparsity(size, size, starts.tolist(), rows.tolist())
+        return ca.Sparsity(self.variables, self.variables, starts.tolist(), rows.tolist())
 
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
-        evaluation, factor = self.evaluation, _read(arguments[2])[0]
-        evaluation.linearised(_read(arguments[0]))
+        evaluation, factor = self.evaluation, read(arguments[2])[0]
+        evaluation.linearised(read(arguments[0]))
         blocks = np.concatenate((evaluation.system.upper.ravel(), evaluation.system.diagonal.ravel()))
-        _write(results[0], factor * blocks[evaluation.entries[2]])
+        write(results[0], factor * blocks[evaluation.entries[2]])
         return 0
-
-
-def _read(buffer: Any) -> FloatArray:
-    return np.frombuffer(buffer, dtype=np.float64)
-
-
-def _write(buffer: Any, values: FloatArray | float) -> None:
-    # an output nobody asked for has no memory
-    if buffer is not None:
-        np.frombuffer(buffer, dtype=np.float64)[:] = values
 
 
 def _scalar_entries(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
