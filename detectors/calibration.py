@@ -1,10 +1,14 @@
 """What is known of one sensor's answer to walls and panes, as plain data."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Self
 
 from detectors.diffuse import DiffuseCurve
+from detectors.entries import flag, mapping, number, numbers, text, whole
+
+DETECTORS = ("calibrated_peak", "narrow_return", "off")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +45,7 @@ class Calibration:
     beams : int
         Beams of a scan; 0: it varies.
     angle_increment : float
-        Step between beams, rad.
+        Step between beams, rad; 0: it varies.
     range_min, range_max : float
         Limits of the sensor, m.
     no_echo : float or None
@@ -93,6 +97,11 @@ class Calibration:
         """Diffuse level at 1 m, unit of the sensor."""
         return float(self.diffuse.level(1.0))
 
+    @property
+    def silent_from(self) -> float:
+        """Ranges from here on mean that nothing came back, m."""
+        return self.range_max if self.no_echo is None else min(self.range_max, self.no_echo)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain lists, numbers and strings, ready for YAML; `from_dict` takes them back."""
         values = asdict(self)
@@ -113,21 +122,17 @@ class Calibration:
         Raises
         ------
         ValueError
-            A name is unknown, a needed one is missing, or a value does not fit.
+            A name is unknown, a needed one is missing, or a value does not fit; the entry is named.
         """
-        given = dict(values)
+        given = mapping("a calibration", values)
         given.pop("intensity_scale", None)
-        try:
-            diffuse = dict(given.pop("diffuse"))
-            diffuse["ranges"] = tuple(float(r) for r in diffuse["ranges"])
-            diffuse["levels"] = tuple(float(v) for v in diffuse["levels"])
-            pane = PaneModel(**given.pop("pane", {}))
-            return cls(diffuse=DiffuseCurve(**diffuse), pane=pane, **given)
-        except KeyError as error:
-            raise ValueError(f"a calibration needs {error.args[0]!r}") from None
-        except TypeError as error:
+        for name in ("sensor", "diffuse"):
+            if name not in given:
+                raise ValueError(f"a calibration needs {name!r}")
+        if strange := sorted(set(given) - set(_READERS)):
             known = ", ".join(f.name for f in fields(cls))
-            raise ValueError(f"not a calibration: {error}; known names are {known}") from None
+            raise ValueError(f"not a calibration: there is no {strange[0]!r}; known names are {known}")
+        return cls(**{name: _READERS[name](name, value) for name, value in given.items()})
 
     def mismatch(self, beams: int, angle_increment: float) -> str:
         """Say why a recording is not of this sensor, or nothing when it may be.
@@ -147,3 +152,55 @@ class Calibration:
         if self.beams and beams > 1.02 * self.beams:
             return f"the calibration of {self.sensor} is for {self.beams} beams, the recording has {beams}"
         return ""
+
+
+def _diffuse(name: str, value: Any) -> DiffuseCurve:
+    given = mapping(name, value)
+    for needed in ("ranges", "levels"):
+        if needed not in given:
+            raise ValueError(f"a calibration needs '{name}.{needed}'")
+    ranges, levels = (numbers(f"{name}.{part}", given.pop(part)) for part in ("ranges", "levels"))
+    return DiffuseCurve(ranges, levels, **_positive(name, given, ("incidence_exponent", "spread")))
+
+
+def _pane(name: str, value: Any) -> PaneModel:
+    return PaneModel(**_positive(name, mapping(name, value), ("haze", "decay", "peak")))
+
+
+def _positive(name: str, given: Mapping[str, Any], known: tuple[str, ...]) -> dict[str, float]:
+    if strange := sorted(set(given) - set(known)):
+        raise ValueError(
+            f"not a calibration: there is no '{name}.{strange[0]}'; known are {', '.join(known)}"
+        )
+    return {key: number(f"{name}.{key}", value, 0.0) for key, value in given.items()}
+
+
+def _number(low: float, high: float = math.inf, *, infinite: bool = False) -> Callable[[str, Any], float]:
+    return lambda name, value: number(name, value, low, high, infinite=infinite)
+
+
+def _no_echo(name: str, value: Any) -> float | None:
+    return None if value is None else number(name, value, 0.0, infinite=True)
+
+
+_READERS: dict[str, Callable[[str, Any], Any]] = {
+    "sensor": text,
+    "diffuse": _diffuse,
+    "beams": whole,
+    "angle_increment": _number(0.0),
+    "range_min": _number(0.0),
+    "range_max": _number(0.0, infinite=True),
+    "no_echo": _no_echo,
+    "floor": _number(0.0),
+    "saturation": _number(0.0, infinite=True),
+    "informative": flag,
+    "detector": lambda name, value: text(name, value, DETECTORS),
+    "thresh": _number(0.0),
+    "grad": _number(0.0),
+    "width": whole,
+    "faint": _number(0.0),
+    "weakest_decay": _number(0.0),
+    "pane": _pane,
+    "date": text,
+    "evidence": mapping,
+}

@@ -21,6 +21,10 @@ BINS_PER_DOUBLING = 3
 LEAST_IN_BIN = 40
 KNOTS = 12
 ROUNDS = 20
+# histogram of the logarithms of intensities, its smoothing in steps, and what counts beside its highest peak
+_MODE_STEP = 0.04
+_MODE_REACH = 6
+_MODE_SHARE = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +75,9 @@ def surface_samples(
 def fit_diffuse_curve(samples: SurfaceSamples) -> DiffuseCurve:
     """Fit the intensity of matte surfaces against range and incidence.
 
-    In every bin of range the densest half of the logarithms is narrowed down to its mode: glass, metal and
-    dark paint spread out, walls do not. A quadratic in the logarithm of the range is laid through the modes.
+    In every bin of range the brightest mode of the logarithms is taken: glass, and all that is seen through
+    it, is fainter, metal is brighter but spreads out. A quadratic in the logarithm of the range is laid
+    through the modes.
 
     Parameters
     ----------
@@ -115,7 +120,7 @@ def fit_diffuse_curve(samples: SurfaceSamples) -> DiffuseCurve:
 def _modes(ranges: FloatArray, logs: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     bins = np.floor(BINS_PER_DOUBLING * np.log2(np.maximum(ranges, 1e-3))).astype(int)
     rows = [
-        (math.exp(float(np.mean(np.log(ranges[bins == b])))), half_sample_mode(logs[bins == b]), float(n))
+        (math.exp(float(np.mean(np.log(ranges[bins == b])))), brightest_mode(logs[bins == b]), float(n))
         for b, n in zip(*np.unique(bins, return_counts=True), strict=True)
         if n >= LEAST_IN_BIN
     ]
@@ -125,24 +130,27 @@ def _modes(ranges: FloatArray, logs: FloatArray) -> tuple[FloatArray, FloatArray
     return centres, modes, np.sqrt(np.minimum(counts, 2000.0))
 
 
-def half_sample_mode(values: FloatArray) -> float:
-    """The value around which a sample is densest: its shortest half, halved again and again.
+def brightest_mode(values: FloatArray) -> float:
+    """The highest value around which many of a sample gather.
+
+    Glass, what stands behind it, and dark paint are all fainter than a matte wall and may well be more
+    numerous; what is brighter - metal, reflectors, the mirror peaks of panes - gathers nowhere.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        At least one value.
+        Logarithms of intensities, at least one.
     """
-    ordered = np.sort(values)
-    while ordered.size > 3:
-        half = (ordered.size + 1) // 2
-        widths = ordered[half - 1 :] - ordered[: ordered.size - half + 1]
-        start = int(np.argmin(widths))
-        # ties come from quantised intensities: more of the same value is denser still
-        if widths[start] == 0.0:
-            return float(ordered[start])
-        ordered = ordered[start : start + half]
-    return float(np.median(ordered))
+    low = float(values.min()) - _MODE_REACH * _MODE_STEP
+    bins = int((float(values.max()) - low) / _MODE_STEP) + _MODE_REACH + 1
+    counts = np.bincount(((values - low) / _MODE_STEP).astype(np.int64), minlength=bins).astype(np.float64)
+    offsets = np.arange(-_MODE_REACH, _MODE_REACH + 1)
+    density = np.convolve(counts, np.exp(-2.0 * (offsets / (0.5 * _MODE_REACH)) ** 2), mode="same")
+    high = density >= _MODE_SHARE * density.max()
+    rising = np.concatenate(([True], density[1:] >= density[:-1]))
+    falling = np.concatenate((density[:-1] >= density[1:], [True]))
+    peak = low + _MODE_STEP * (float(np.flatnonzero(high & rising & falling)[-1]) + 0.5)
+    return float(values[np.abs(values - peak) <= 0.5 * _MODE_REACH * _MODE_STEP].mean())
 
 
 def _robust_polynomial(x: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:

@@ -126,6 +126,68 @@ def _median_between(
 
 
 @kernel
+def _collect_lobe(
+    ranges: FloatArray,
+    labels: LabelArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    levels: FloatArray,
+    angle_min: float,
+    angle_increment: float,
+    first: int,
+    last: int,
+    normal: float,
+    distance: float,
+    angles: FloatArray,
+    logs: FloatArray,
+) -> int:
+    """Write signed angles to the normal and logarithms of levels of returns on a line; returns how many."""
+    used = 0
+    c = math.cos(normal)
+    s = math.sin(normal)
+    tolerance = TOLERANCE + TOLERANCE_PER_METRE * distance
+    for beam in range(first, last):
+        if labels[beam] != SOLID:
+            continue
+        phi = angle_min + angle_increment * beam - normal
+        behind = ranges[beam] * (cosines[beam] * c + sines[beam] * s) - distance
+        if CORE <= abs(phi) <= LOBE_TO and abs(behind) <= tolerance:
+            angles[used] = phi
+            logs[used] = math.log(max(levels[beam], DIMMEST))
+            used += 1
+    return used
+
+
+@kernel
+def _weigh_lobe(
+    angles: FloatArray, logs: FloatArray, used: int, intercept: float, decay: float, robust: bool
+) -> tuple[float, float, float]:
+    """One round of the fit of logs = intercept - decay * |angle|, weighted by the residuals of the last one.
+
+    Returns the intercept, the decay and the spread about the last line; the spread is +inf where the angles
+    do not tell a decay.
+    """
+    n = sx = sy = sxx = sxy = deviation = 0.0
+    for k in range(used):
+        weight = 1.0
+        away = abs(angles[k])
+        if robust:
+            residual = abs(logs[k] - intercept + decay * away)
+            deviation += min(residual, 1.0)
+            weight = 1.0 / (1.0 + (residual / OUTLIER) ** 2)
+        n += weight
+        sx += weight * away
+        sy += weight * logs[k]
+        sxx += weight * away * away
+        sxy += weight * away * logs[k]
+    variance = sxx - sx * sx / n
+    if variance < 1e-9:
+        return 0.0, 0.0, math.inf
+    slope = -(sxy - sx * sy / n) / variance
+    return (sy + slope * sx) / n, slope, deviation / used
+
+
+@kernel
 def fit_lobe(
     ranges: FloatArray,
     labels: LabelArray,
@@ -147,42 +209,17 @@ def fit_lobe(
     and `logs`, room for as many values as there are beams, receive the signed angles to the normal and the
     logarithms of the levels.
     """
-    used = 0
-    c = math.cos(normal)
-    s = math.sin(normal)
-    tolerance = TOLERANCE + TOLERANCE_PER_METRE * distance
-    for beam in range(first, last):
-        if labels[beam] != SOLID:
-            continue
-        phi = angle_min + angle_increment * beam - normal
-        behind = ranges[beam] * (cosines[beam] * c + sines[beam] * s) - distance
-        if CORE <= abs(phi) <= LOBE_TO and abs(behind) <= tolerance:
-            angles[used] = phi
-            logs[used] = math.log(max(levels[beam], DIMMEST))
-            used += 1
+    used = _collect_lobe(
+        ranges, labels, cosines, sines, levels, angle_min, angle_increment, first, last, normal, distance,
+        angles, logs,
+    )  # fmt: skip
     if used < 4:
         return 0.0, 0.0, math.inf, used
     intercept = 0.0
     decay = 0.0
     spread = math.inf
     for step in range(LOBE_ROUNDS):
-        n = sx = sy = sxx = sxy = deviation = 0.0
-        for k in range(used):
-            weight = 1.0
-            away = abs(angles[k])
-            if step > 0:
-                residual = abs(logs[k] - intercept + decay * away)
-                deviation += min(residual, 1.0)
-                weight = 1.0 / (1.0 + (residual / OUTLIER) ** 2)
-            n += weight
-            sx += weight * away
-            sy += weight * logs[k]
-            sxx += weight * away * away
-            sxy += weight * away * logs[k]
-        variance = sxx - sx * sx / n
-        if variance < 1e-9:
+        intercept, decay, spread = _weigh_lobe(angles, logs, used, intercept, decay, step > 0)
+        if math.isinf(spread):
             return 0.0, 0.0, math.inf, used
-        decay = -(sxy - sx * sy / n) / variance
-        intercept = (sy + decay * sx) / n
-        spread = deviation / used
     return math.exp(min(intercept, 5.0)), decay, spread, used

@@ -6,12 +6,7 @@ from detectors.accelerate import kernel
 from detectors.detection import FloatArray, IntArray, LabelArray
 from detectors.labels import SOLID
 from detectors.lobe_kernels import ANSWERED, DIM, PASSED, TOTAL, count_shoulders, fit_lobe, least_fall
-from detectors.pane_lines import (
-    FIRST_TOLERANCE,
-    FIT_HALF_ANGLE,
-    find_feet,
-    fit_line,
-)
+from detectors.pane_lines import FIRST_TOLERANCE, FIT_HALF_ANGLE, find_feet, fit_line
 
 # columns of a pane
 NORMAL, DISTANCE, SPREAD, AMPLITUDE, DECAY, ODDS, PEAK, USED = range(8)
@@ -150,6 +145,55 @@ def _explained(panes: FloatArray, count: int, distance: float, bearing: float) -
 
 
 @kernel
+def _measure(
+    ranges: FloatArray,
+    labels: LabelArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    levels: FloatArray,
+    angle_min: float,
+    angle_increment: float,
+    first: int,
+    last: int,
+    bearing: float,
+    nearest: float,
+    faint: float,
+    weakest_decay: float,
+    least_odds: float,
+    angles: FloatArray,
+    logs: FloatArray,
+    room: FloatArray,
+    counts: FloatArray,
+    row: FloatArray,
+) -> bool:
+    """Fit a surface near a foot and write it into `row`; False where it is no pane by `least_odds`."""
+    normal, distance, spread, used = fit_line(
+        ranges, labels, cosines, sines, levels, first, last, bearing, nearest
+    )
+    if used * angle_increment < LEAST_SPAN:
+        return False
+    peak = count_shoulders(
+        ranges, labels, cosines, sines, levels, angle_min, angle_increment, first, last, normal, distance,
+        faint, counts,
+    )  # fmt: skip
+    # the fit of the lobe costs most: not worth it where even a perfect one would not do
+    if lobe_odds(counts, distance, 1.0, 2.0 * weakest_decay, 0.0, spread, weakest_decay) < least_odds:
+        return False
+    amplitude, decay, deviation, beams = fit_lobe(
+        ranges, labels, cosines, sines, levels, angle_min, angle_increment, first, last, normal, distance,
+        angles, logs,
+    )  # fmt: skip
+    odds = lobe_odds(counts, distance, amplitude, decay, deviation, spread, weakest_decay)
+    odds -= polish_odds(amplitude, least_fall(angles, logs, beams, faint, room))
+    if odds < least_odds or beams < LEAST_FAINT:
+        return False
+    row[NORMAL], row[DISTANCE], row[SPREAD] = normal, distance, spread
+    row[AMPLITUDE], row[DECAY], row[ODDS] = amplitude, decay, odds
+    row[PEAK], row[USED] = max(peak, amplitude), used
+    return True
+
+
+@kernel
 def find_panes(
     ranges: FloatArray,
     labels: LabelArray,
@@ -181,69 +225,16 @@ def find_panes(
         first = max(0, foot - window)
         last = min(ranges.size, foot + window + 1)
         bearing = angle_min + angle_increment * foot
-        if dim[last] - dim[first] < LEAST_FAINT or smooth[foot] > range_limit:
+        nearest = smooth[foot]
+        if dim[last] - dim[first] < LEAST_FAINT or nearest > range_limit:
             continue
-        if _explained(panes, found, smooth[foot], bearing):
+        if _explained(panes, found, nearest, bearing):
             continue
-        if not _promising(ranges, labels, cosines, sines, levels, first, last, foot, smooth[foot], faint):
+        if not _promising(ranges, labels, cosines, sines, levels, first, last, foot, nearest, faint):
             continue
-        normal, distance, spread, used = fit_line(
-            ranges,
-            labels,
-            cosines,
-            sines,
-            levels,
-            first,
-            last,
-            bearing,
-            smooth[foot],
-        )
-        if used * angle_increment < LEAST_SPAN:
-            continue
-        peak = count_shoulders(
-            ranges,
-            labels,
-            cosines,
-            sines,
-            levels,
-            angle_min,
-            angle_increment,
-            first,
-            last,
-            normal,
-            distance,
-            faint,
-            counts,
-        )
-        # the fit of the lobe costs most: not worth it where even a perfect one would not do
-        if lobe_odds(counts, distance, 1.0, 2.0 * weakest_decay, 0.0, spread, weakest_decay) < least_odds:
-            continue
-        amplitude, decay, deviation, lobe_beams = fit_lobe(
-            ranges,
-            labels,
-            cosines,
-            sines,
-            levels,
-            angle_min,
-            angle_increment,
-            first,
-            last,
-            normal,
-            distance,
-            angles,
-            logs,
-        )
-        odds = lobe_odds(counts, distance, amplitude, decay, deviation, spread, weakest_decay)
-        odds -= polish_odds(amplitude, least_fall(angles, logs, lobe_beams, faint, room))
-        if odds < least_odds or lobe_beams < LEAST_FAINT:
-            continue
-        row[NORMAL] = normal
-        row[DISTANCE] = distance
-        row[SPREAD] = spread
-        row[AMPLITUDE] = amplitude
-        row[DECAY] = decay
-        row[ODDS] = odds
-        row[PEAK] = max(peak, amplitude)
-        row[USED] = used
-        found = _keep(panes, found, row)
+        if _measure(
+            ranges, labels, cosines, sines, levels, angle_min, angle_increment, first, last, bearing, nearest,
+            faint, weakest_decay, least_odds, angles, logs, room, counts, row,
+        ):  # fmt: skip
+            found = _keep(panes, found, row)
     return found

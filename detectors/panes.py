@@ -34,6 +34,8 @@ class PaneProfile:
         Whether the pane answered, or nothing did before the beam was through.
     beams : ndarray of int64, shape (n,)
         Indices of the beams in the scan.
+    along : tuple of float
+        Ends of the pane along its plane, m from the foot of the normal, counter-clockwise positive.
     """
 
     normal: float
@@ -44,6 +46,7 @@ class PaneProfile:
     answered: NDArray[np.bool_]
     passed: NDArray[np.bool_]
     beams: NDArray[np.int64]
+    along: tuple[float, float] = (-math.inf, math.inf)
 
 
 def find_pane(
@@ -153,4 +156,5 @@ def pane_profile(
         answered=solid & (np.abs(behind) <= tolerance),
         passed=silent | (solid & (behind > 2.0 * tolerance)),
         beams=chosen,
+        along=along,
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from glassslam.errors import ConfigError
 
@@ -14,12 +14,15 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Probability = Annotated[float, Field(gt=0, lt=1)]
 Solver = Literal["lm", "casadi"]
 Count = Annotated[int, Field(ge=1)]
+Small = Annotated[float, Field(ge=-0.2, le=0.2)]
 
 
 class Section(BaseModel):
     """One frozen group of parameters; unknown names are refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_default=True, ser_json_inf_nan="constants"
+    )
 
 
 class SensorConfig(Section):
@@ -31,6 +34,14 @@ class SensorConfig(Section):
     """Farthest range used as a hit, m."""
     missing_data_ray_length: NonNegative = 5.0
     """Free space cleared by a beam without echo, m."""
+    bearing_cosine: Small = 0.0
+    """Beams announced at angle t point to t + this * cos(t), rad; `estimate_beam_errors` tells it."""
+    bearing_sine: Small = 0.0
+    """The same with sin(t), rad."""
+    lateral_offset: Small = 0.0
+    """Distance by which beams pass the axis of the lidar on the left, m; lidars that triangulate have it."""
+    range_offset: Small = 0.0
+    """What is added to every range with an echo, m."""
 
 
 class FilterConfig(Section):
@@ -177,18 +188,164 @@ class GlassWallConfig(Section):
 class GlassConfig(Section):
     """Detection of glass and what becomes of it in the map."""
 
-    detector: Literal["off", "intensity_peak", "wang_wang", "calibrated_peak", "narrow_return"] = "off"
-    """How panes are found in a scan; by intensity for Hokuyo and SICK, by narrow returns for cheap lidars."""
+    detector: Literal["auto", "off", "intensity_peak", "wang_wang", "calibrated_peak", "narrow_return"] = (
+        "auto"
+    )
+    """How panes are found in a scan; `auto` decides by the intensities and the resolution of the scans."""
+    require_intensity: bool = False
+    """Whether a recording whose intensities tell nothing is an error; otherwise it is mapped without glass."""
+    scheme: Literal["off", "local", "global", "lite", "anchored"] = "anchored"
+    """How glass stays in the map: not at all, locked in the submaps as Weerakoon et al. do it, or following
+    the pose graph."""
     sensor: str = ""
-    """Name of the shipped calibration that `calibrated_peak` uses."""
+    """Name of the shipped calibration that `calibrated_peak` uses; without one it calibrates itself."""
+    calibration: dict[str, Any] | None = None
+    """Calibration of the lidar as `glassslam calibrate` writes it; it goes before `sensor`."""
     thresh: Positive = 3000.0
     """Least intensity of `intensity_peak` and `wang_wang`, unit of the sensor."""
     grad: Positive = 500.0
     """Least rise and fall of the intensity from beam to beam, unit of the sensor."""
     width: Count = 10
     """Largest width of an intensity peak, beams."""
+    ghosts_in_matching: bool = True
+    """Whether returns that the detector sees behind a pane are matched and entered into submaps. What stands
+    there is real but for mirror images, and holds the robot in hallways of glass."""
+    ghosts_in_map: Literal["all", "seen_through", "none"] = "seen_through"
+    """What the map shows behind glass walls: all, all but mirror images, or nothing seen through them."""
     walls: GlassWallConfig = GlassWallConfig()
     """Walls fitted from the observations."""
+
+    @field_validator("detector", "scheme", mode="before")
+    @classmethod
+    def _off(cls, value: Any) -> Any:
+        """YAML reads a bare `off` as false."""
+        return "off" if value is False else value
+
+    @field_validator("detector", mode="before")
+    @classmethod
+    def _word(cls, value: Any) -> Any:
+        """The word `off`, which YAML reads as false."""
+        return "off" if value is False else value
+
+    @field_validator("calibration", mode="before")
+    @classmethod
+    def _complete(cls, value: Any) -> Any:
+        """The calibration with all its entries, so that the configuration says everything."""
+        if value is None:
+            return None
+        from detectors.calibration import Calibration  # noqa: PLC0415  (loads numba)
+
+        return Calibration.from_dict(value).to_dict()
+
+
+class SonarGlassConfig(Section):
+    """Pieces of glass told by sonars where the lidar looks through."""
+
+    max_range: Positive = 3.0
+    """Longest reading used, m."""
+    min_gap: Positive = 0.25
+    """How far behind the end of a sonar reading a lidar beam that passed it ends, at least, m."""
+    min_passed_share: Probability = 0.75
+    """Least share of the lidar beams at a piece that pass it."""
+    min_readings: Count = 4
+    """New readings in a row that agree on a surface, at least."""
+    max_span: Positive = 0.5
+    """Longest stretch of the surface that one piece is made from, m."""
+    max_pause: Positive = 1.0
+    """Longest time between two readings of one piece, s."""
+    max_residual: Positive = 0.02
+    """Largest root mean square of the readings about their surface, m."""
+    max_normal_sigma_deg: Positive = 2.5
+    """Pieces whose direction is known worse are left out, deg."""
+    range_bias: NonNegative = 0.03
+    """Error common to neighbouring readings, m: it does not average out."""
+    probability: Probability = 0.9
+    """That such a piece is glass rather than a thing below the plane of the lidar."""
+
+
+class FusionConfig(Section):
+    """How the sonar map joins the lidar map."""
+
+    method: Literal[
+        "overlay", "attach", "pessimistic", "minmax", "lop", "liop", "iop", "bayes", "rsf_glass", "rsf_all"
+    ] = "rsf_all"
+    """Rule that joins the two maps; every rule is described in `glassslam.fusion`."""
+    occupied_threshold: Probability = 0.65
+    """P(occupied) from which a cell stops a ray of `rsf_*` and is attached by `attach`."""
+    glass_gap: Positive = 0.5
+    """A ray meets glass when its lidar length exceeds its sonar length by more, m (`rsf_*`)."""
+    sonars: Literal["all", "sides"] = "all"
+    """Sonars along which maps are revisited: all, or the one nearest to each side (`rsf_*`)."""
+    lidar_weight: NonNegative = 0.75
+    """Weight of the lidar map in `lop` and `liop`."""
+    sonar_weight: NonNegative = 0.25
+    """Weight of the sonar map in `lop` and `liop`."""
+    prior: Probability = 0.5
+    """P(occupied) before any measurement, for `bayes`."""
+    overlay_resolution: Positive = 0.1
+    """Cell edge of the layer of end points, m (`overlay`)."""
+    overlay_max_range: Positive = 2.0
+    """Longest reading entered into that layer, m (`overlay`)."""
+    overlay_min_occupancy: Probability = 0.07
+    """Least share of readings that end in a cell rather than pass it (`overlay`)."""
+
+
+class ScanFilterConfig(Section):
+    """Laser readings replaced by sonar before any SLAM."""
+
+    enabled: bool = False
+    """Whether scans are filtered at all."""
+    max_range: Positive = 3.0
+    """Longest sonar reading used, m."""
+    max_sector_deg: Positive = 20.0
+    """Largest width of the sector of laser beams that belongs to one sonar, deg."""
+    max_pairing_time: Positive = 0.4
+    """Oldest sonar reading that a scan is compared with, s."""
+    glass_offset: NonNegative = 0.3
+    """D_go: a beam looks through glass when it is longer than the sonar reading by this, m."""
+    min_share: Annotated[float, Field(gt=0, le=1)] = 0.5
+    """D_sl: least share of such beams in a sector."""
+    min_difference: NonNegative = 0.08
+    """R_sl: least weighted difference of the sector, m."""
+    corner_slope: Positive = 10.0
+    """C_T: change of range with angle that counts as a corner, m/rad."""
+
+
+class SonarConfig(Section):
+    """Maps from sonar rings, and what becomes of them."""
+
+    algorithm: Literal["ICL", "ICo", "DS", "BFA"] = "BFA"
+    """Centre line or cone with weighted means, Dempster-Shafer masses, or Bayesian update."""
+    pose_kind: Literal["Loc", "PG", "FG", "FGfit"] = "FGfit"
+    """Poses of the sweeps: local, partially global, final of the nearest node, or final interpolated."""
+    resolution: Positive = 0.05
+    """Cell edge, m."""
+    max_range: Positive = 2.0
+    """Longest reading entered as an obstacle, m; longer ones clear the cone up to here."""
+    no_echo_free_length: NonNegative = 0.0
+    """Free space cleared by a sonar without echo, m; a smooth wall seen aslant does not echo either."""
+    beam_width_deg: NonNegative = 18.0
+    """Full width of the cone that echoes, deg, at most the field of view of the ring; 0: all of that."""
+    arc_thickness: Positive = 0.05
+    """Half thickness of the occupied arc at the sensor, m."""
+    arc_growth: NonNegative = 0.01
+    """Growth of that half thickness with the range, m/m."""
+    occupied_belief: Probability = 0.6
+    """Full mass of a cell in the middle of the arc; BFA takes 0.5 + half of it as P(occupied)."""
+    empty_belief: Probability = 0.1
+    """Empty mass of a cell on the axis before the arc; BFA takes 0.5 - half of it as P(occupied)."""
+    distance_threshold: Positive = 4.0
+    """N_g of ICL and ICo: range at which an obstacle is entered with 1/e, m."""
+    old_weight: Probability = 0.7
+    """W_a of ICL and ICo: weight of the value before."""
+    new_weight: Probability = 0.3
+    """W_b of ICL and ICo: weight of the value of the reading."""
+    glass: SonarGlassConfig = SonarGlassConfig()
+    """Glass told by sonars."""
+    fusion: FusionConfig = FusionConfig()
+    """How the sonar map joins the lidar map."""
+    scan_filter: ScanFilterConfig = ScanFilterConfig()
+    """Laser readings replaced by sonar before any SLAM."""
 
 
 class Config(Section):
@@ -203,6 +360,7 @@ class Config(Section):
     optimization: OptimizationConfig = OptimizationConfig()
     map: MapConfig = MapConfig()
     glass: GlassConfig = GlassConfig()
+    sonar: SonarConfig = SonarConfig()
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -263,4 +421,6 @@ def _explain(model: type[BaseModel], error: ValidationError, origin: str) -> Con
         close = difflib.get_close_matches(str(location[-1]), known, n=1)
         hint = f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(known)}"
         return ConfigError(f"{origin}: unknown parameter {name!r}", hint)
+    if first["type"] == "value_error":  # raised by our own checks, which quote what they found
+        return ConfigError(f"{origin}: {name}: {first['ctx']['error']}")
     return ConfigError(f"{origin}: {name}: {first['msg']}", f"found {first['input']!r:.60}")

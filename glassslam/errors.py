@@ -38,6 +38,10 @@ class NoScansError(RecordingError):
     """A recording in which no usable laser scan was found."""
 
 
+class CalibrationError(GlassSlamError):
+    """Recordings from which a lidar cannot be calibrated."""
+
+
 class OutputError(GlassSlamError):
     """A result that cannot be written or read back."""
 

@@ -89,7 +89,71 @@ class Imu:
     record_stamp: float = 0.0
 
 
-Record: TypeAlias = LaserScan | Odometry | Imu
+@dataclass(frozen=True, slots=True)
+class SonarRing:
+    """Where the sonars of a robot sit.
+
+    Attributes
+    ----------
+    poses : ndarray of float64, shape (n, 3)
+        Pose (x, y, yaw) of every sonar in the base frame, m and rad; it looks along its x axis.
+    field_of_view : float
+        Full opening angle of the cone, rad.
+    range_min, range_max : float
+        Limits of the sonars, m.
+    name : str
+        Name of the ring; empty when it was read from a recording.
+    """
+
+    poses: FloatArray
+    field_of_view: float
+    range_min: float
+    range_max: float
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RangeRing:
+    """One sweep of a ring of sonars.
+
+    Attributes
+    ----------
+    stamp : float
+        Time, s.
+    ranges : ndarray of float32, shape (n,)
+        One range per sonar, m; +inf: no echo; NaN: no new reading.
+    record_stamp : float
+        Time at which the message was recorded, s.
+    """
+
+    stamp: float
+    ranges: Float32Array
+    record_stamp: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PointSet:
+    """Points of a 3D ultrasonic sensor, in the frame of the base.
+
+    Attributes
+    ----------
+    stamp : float
+        Time, s.
+    points : ndarray of float32, shape (n, 3)
+        Echoes, m.
+    origin : ndarray of float64, shape (3,)
+        Where the sensor sits in the base frame, m.
+    record_stamp : float
+        Time at which the message was recorded, s.
+    """
+
+    stamp: float
+    points: Float32Array
+    origin: FloatArray
+    record_stamp: float = 0.0
+
+
+Record: TypeAlias = LaserScan | Odometry | Imu | RangeRing | PointSet
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +165,7 @@ class RecordingInfo:
     paths : tuple of str
         The files read, as given.
     format : str
-        "rosbag1", "rosbag2-sqlite3", "rosbag2-mcap" or "carmen".
+        "rosbag1", "rosbag2-sqlite3", "rosbag2-mcap", "carmen" or "player".
     duration : float
         Recorded time from the first to the last record used, s.
     scan_count : int
@@ -112,6 +176,10 @@ class RecordingInfo:
         Topics in use; empty when there is none. Odometry from tf is named "tf:PARENT->CHILD".
     no_echo : float or None
         The range written for beams without echo, m (may be inf); None when it is not known.
+    sonar_ring : SonarRing or None
+        Where the sonars sit; None without a ring.
+    sonar_topics : tuple of str
+        Topics of the ring and of 3D ultrasonic sensors in use.
     """
 
     paths: tuple[str, ...]
@@ -123,6 +191,8 @@ class RecordingInfo:
     odom_topic: str = ""
     imu_topic: str = ""
     no_echo: float | None = None
+    sonar_ring: SonarRing | None = None
+    sonar_topics: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import medfilt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -21,6 +20,10 @@ _CELL = 0.1
 _SECTOR = math.radians(10.0)
 _SLACK = math.radians(4.0)
 _SHORTEST = 4.0
+_CANDIDATES = 64
+_STRETCH = 1.5
+_FEW = 3
+_ROUNDS = 3
 
 
 def merge_pieces(
@@ -111,18 +114,47 @@ def _principal(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _cut(positions: FloatArray, ordered: NDArray[np.int64], distance: float) -> list[NDArray[np.int64]]:
+    """Parts of a chain, split where it bends most and rejoined where a split turned out to be needless."""
     points = positions[ordered]
-    centre, axis = _principal(points)
-    gaps = (points - centre) @ np.array([-axis[1], axis[0]])
-    # single strays are left to the fit; a bend shows in the median of several neighbours
-    smooth = np.abs(medfilt(gaps, 5)) if len(points) >= 5 else np.zeros(len(points))
-    if smooth.max() <= distance:
+    if _is_straight(points, distance):
         return [ordered]
+    axis = _principal(points)[1]
     along = (points - points[0]) @ (axis * np.sign((points[-1] - points[0]) @ axis))
-    inner = (along > _SHORTEST) & (along < along[-1] - _SHORTEST)
-    if not inner.any():
+    inner = np.flatnonzero((along > _SHORTEST) & (along < along[-1] - _SHORTEST))
+    if len(inner) == 0:
         return [ordered]
-    chord = points[-1] - points[0]
-    offset = medfilt((points - points[0]) @ np.array([-chord[1], chord[0]]), 5)
-    bend = int(np.argmax(np.where(inner, np.abs(offset), -1.0)))
-    return _cut(positions, ordered[: bend + 1], distance) + _cut(positions, ordered[bend:], distance)
+    bend = _bend(points, inner[:: -(-len(inner) // _CANDIDATES)], distance)
+    before = _cut(positions, ordered[: bend + 1], distance)
+    after = _cut(positions, ordered[bend:], distance)
+    joint = np.concatenate((before[-1][:-1], after[0]))
+    if _is_straight(positions[joint], distance):
+        return [*before[:-1], joint, *after[1:]]
+    return before + after
+
+
+def _is_straight(points: FloatArray, distance: float) -> bool:
+    """Whether a line fits; strays are left to the fit of the wall, the median of a stretch shows a bend."""
+    kept = points
+    for _ in range(_ROUNDS):
+        centre, axis = _principal(kept)
+        along, gaps = (points - centre) @ axis, (points - centre) @ np.array([-axis[1], axis[0]])
+        near = np.abs(gaps) <= max(distance, 2.0 * float(np.median(np.abs(gaps))))
+        kept = points[near]
+    steps = np.arange(along.min(), along.max() + _STRETCH, 0.5 * _STRETCH)
+    parts = (gaps[np.abs(along - step) <= 0.5 * _STRETCH] for step in steps)
+    return all(len(part) < _FEW or abs(float(np.median(part))) <= distance for part in parts)
+
+
+def _gaps(points: FloatArray) -> FloatArray:
+    """Signed distances of points from the line through them, m."""
+    centre, axis = _principal(points)
+    return np.asarray((points - centre) @ np.array([-axis[1], axis[0]]))
+
+
+def _bend(points: FloatArray, candidates: NDArray[np.int64], distance: float) -> int:
+    """The piece at which two straight lines fit a chain best; strays count no more than `distance`."""
+    left_over = [
+        sum(float(np.minimum(_gaps(part) ** 2, distance**2).sum()) for part in (points[: k + 1], points[k:]))
+        for k in candidates
+    ]
+    return int(candidates[int(np.argmin(left_over))])

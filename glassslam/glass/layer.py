@@ -1,7 +1,7 @@
 """What a run found out about glass, and its place in the map."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 from glassslam.records import Float32Array, FloatArray
 
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
+    from glassslam.glass.beam_labels import GlassBeams
+    from glassslam.glass.ghosts import Ghosts
     from glassslam.glass.observations import GlassObservations
     from glassslam.glass.walls import GlassWall
 
 GLASS_PROBABILITY = 0.98
 """P(occupied) of the cells of a glass wall: no robot should drive there."""
+
+
+def _no_cells() -> FloatArray:
+    return np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +37,24 @@ class GlassLayer:
         Where the observations are in the map frame, m.
     normals : ndarray of float64, shape (k,)
         Their surface normals in the map frame, rad.
+    locked_cells : ndarray of float64, shape (c, 2)
+        Centres of the cells of the map that are occupied because of glass, m.
+    beams : GlassBeams or None
+        Labels of single beams.
+    ghosts : Ghosts or None
+        Which returns came from behind the walls.
+    ghost_cells : ndarray of float64, shape (g, 2)
+        Centres of the cells of the map in which nothing but ghosts ends, m.
     """
 
     walls: "tuple[GlassWall, ...]"
     observations: "GlassObservations"
     positions: FloatArray
     normals: FloatArray
+    locked_cells: FloatArray = field(default_factory=_no_cells)
+    beams: "GlassBeams | None" = None
+    ghosts: "Ghosts | None" = None
+    ghost_cells: FloatArray = field(default_factory=_no_cells)
 
 
 def wall_cells(

@@ -17,6 +17,7 @@ def glass_stretches(
     solid: NDArray[np.int64],
     passed: NDArray[np.int64],
     passed_normal: NDArray[np.int64],
+    gone: NDArray[np.bool_],
     config: GlassWallConfig,
 ) -> NDArray[np.bool_]:
     """Pieces of a line that are glass: observed, bridged, or up to the frame that holds them.
@@ -27,6 +28,8 @@ def glass_stretches(
         Observations by piece of `STEP`; at least one piece has some.
     solid, passed, passed_normal : ndarray of int64, shape (b,)
         Returns on the line, beams through it, and beams through it at normal incidence, by piece.
+    gone : ndarray of bool, shape (b,)
+        Pieces that were glass once and are open now.
     config : GlassWallConfig
         Tolerances.
 
@@ -35,15 +38,24 @@ def glass_stretches(
     ndarray of bool, shape (b,)
         True for glass.
     """
-    observed = seen > 0
+    observed = (seen > 0) & ~gone
     glass = observed.copy()
-    answers = int(seen[observed].sum())
-    # the share of beams at normal incidence that this glass answered, from the stretches where it did
-    rate = answers / (answers + int(passed_normal[observed].sum()))
+    if not observed.any():
+        return glass
+    # the share of beams at normal incidence that this glass answered, from the stretches where it did; but
+    # those are chosen for having answered, and it is no more than the mean of all pieces of the line
+    answers, met = int(seen[observed].sum()), seen + passed_normal
+    reach = slice(int(np.argmax(observed)), len(seen) - int(np.argmax(observed[::-1])))
+    rate = min(
+        answers / int(met[observed].sum()),
+        float(np.mean((seen[reach] / np.maximum(met[reach], 1))[met[reach] > 0])),
+    )
     opaque = opaque_pieces(seen, solid, passed)
     for first, last in runs(~observed):
         inner = slice(first, last + 1)
         between = first > 0 and last < len(seen) - 1
+        if gone[inner].any():
+            continue
         if between and _may_bridge(opaque[inner], passed[inner], passed_normal[inner], rate, config):
             glass[inner] = True
             continue

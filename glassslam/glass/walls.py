@@ -19,6 +19,7 @@ from glassslam.glass.evidence_kernels import count_along_line
 from glassslam.glass.lines import Line, fit_line, members
 from glassslam.glass.observations import GlassObservations
 from glassslam.glass.stretches import STEP, glass_stretches, opaque_pieces, runs
+from glassslam.glass.withdrawal import withdrawn_pieces
 from glassslam.records import FloatArray
 
 __all__ = ["BeamEvidence", "Beams", "GlassWall", "fit_walls"]
@@ -152,11 +153,12 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
     start, seen = _seen(along, reach, config.max_extension + STEP)
     solid, passed, passed_normal = _counts(line, start, len(seen), scene.node_poses, scene.beams)
     posts = opaque_pieces(seen, solid, passed)
+    gone = _gone(line, chosen, along, reach, (start, STEP, len(seen)), scene)
     near = np.abs(line.gap(positions)) < config.distance_tolerance
     # a map that is not perfect bends: pieces off the line still tell where the wall goes on, but do not count
     on_line = np.isin(chosen, _on_line(line, chosen, positions, scene.normals, config))
     walls = []
-    for first, last in runs(glass_stretches(seen, solid, passed, passed_normal, config)):
+    for first, last in runs(glass_stretches(seen, solid, passed, passed_normal, gone, config)):
         low, high = start + first * STEP, start + (last + 1) * STEP
         inside = (along >= low - 0.5 * STEP) & (along <= high + 0.5 * STEP)
         # a wall that no post holds ends with its last observation, not with the piece that lies in
@@ -171,6 +173,23 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
             free[strip] = False
             walls.append(wall)
     return walls
+
+
+def _gone(
+    line: Line,
+    chosen: NDArray[np.int64],
+    along: FloatArray,
+    reach: FloatArray,
+    pieces: tuple[float, float, int],
+    scene: _Scene,
+) -> NDArray[np.bool_]:
+    """Pieces of a line at which later nodes found the glass gone."""
+    seen = scene.observations
+    distances = np.hypot(*(seen.position[chosen] - seen.sensor[chosen]).T)
+    return withdrawn_pieces(
+        line, np.stack((along - reach, along + reach), axis=1), seen.node[chosen], distances, pieces,
+        scene.node_poses, scene.beams, scene.config.opening_evidence,
+    )  # fmt: skip
 
 
 def _seen(along: FloatArray, reach: FloatArray, margin: float) -> tuple[float, NDArray[np.int64]]:

@@ -1,8 +1,8 @@
 """Kernels of the probability grid.
 
-A cell is a uint16: 0 means never observed, any other value v means the log odds
-`lower + (v - 1) * LOG_ODDS_STEP`. Columns run along x, rows along y; the cell (0, 0) has its lower
-left corner at the origin.
+A cell is a uint16: 0 means never observed, a value v up to `top` means the log odds
+`lower + (v - 1) * LOG_ODDS_STEP`, and `top` + 1 is locked: occupied, whatever is observed later.
+Columns run along x, rows along y; the cell (0, 0) has its lower left corner at the origin.
 """
 
 import math
@@ -19,7 +19,9 @@ Cells: TypeAlias = NDArray[np.uint16]
 
 @kernel
 def updated(value: np.uint16, step: int, prior: int, top: int) -> np.uint16:
-    """Cell value after one observation; an unknown cell starts from even odds."""
+    """Cell value after one observation; an unknown cell starts from even odds, a locked one stays."""
+    if value > top:
+        return value
     odds = np.int64(prior) if value == 0 else np.int64(value)
     return np.uint16(min(max(int(odds) + step, 1), top))
 

@@ -63,7 +63,7 @@ class OddsModel:
         for name, fine, limits in checks:
             if not fine:
                 raise GridError(f"{name} is {getattr(self, name)}", f"it must be {limits}")
-        if self.top > _LARGEST_VALUE:
+        if self.locked > _LARGEST_VALUE:
             raise GridError(
                 f"cells cannot span {self.lower_probability} to {self.upper_probability}",
                 "keep the clamp away from 0 and 1",
@@ -90,8 +90,16 @@ class OddsModel:
         span = log_odds(self.upper_probability) - log_odds(self.lower_probability)
         return 1 + round(span / LOG_ODDS_STEP)
 
+    @property
+    def locked(self) -> int:
+        """Value of a locked cell, which observations no longer change."""
+        return self.top + 1
+
     def table(self) -> Float32Array:
-        """P(occupied) of every cell value, shape (top + 1,); entry 0 is that of unknown cells."""
+        """P(occupied) of every cell value, shape (top + 2,); entry 0 is that of unknown cells.
+
+        The last entry is that of locked cells: the upper clamp.
+        """
         odds = log_odds(self.lower_probability) + LOG_ODDS_STEP * np.arange(self.top)
         known = 1.0 / (1.0 + np.exp(-odds))
-        return np.concatenate(([self.unknown_probability], known)).astype(np.float32)
+        return np.concatenate(([self.unknown_probability], known, known[-1:])).astype(np.float32)

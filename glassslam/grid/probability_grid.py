@@ -107,6 +107,31 @@ class ProbabilityGrid:
             free_ends - self.origin, 1.0 / self.resolution, hit, miss, prior, top,
         )  # fmt: skip
 
+    def lock(self, points: FloatArray) -> None:
+        """Occupy the cells of points for good: neither returns nor rays change them afterwards.
+
+        Parameters
+        ----------
+        points : ndarray of float64, shape (n, 2)
+            Points in the frame of the grid, m.
+
+        Raises
+        ------
+        GridError
+            A coordinate that is not finite, or an array of another shape.
+        """
+        points = point_array(points)
+        if len(points) == 0:
+            return
+        self._contain(points[0], points, points[:0])
+        index = np.floor((points - self.origin) / self.resolution).astype(np.int64)
+        self.cells[index[:, 1], index[:, 0]] = self.odds.locked
+
+    def locked_points(self) -> FloatArray:
+        """Centres of the locked cells in the frame of the grid, m, shape (n, 2)."""
+        rows, columns = np.nonzero(self.cells == self.odds.locked)
+        return self.origin + self.resolution * (np.stack((columns, rows), axis=1) + 0.5)
+
     def finish(self) -> None:
         """Crop to the observed cells and drop what only insertion needs."""
         self._marks = np.zeros((0, 0), dtype=np.uint16)

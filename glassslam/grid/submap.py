@@ -8,6 +8,8 @@ from glassslam.grid.odds import OddsModel
 from glassslam.grid.probability_grid import ProbabilityGrid
 from glassslam.records import FloatArray
 
+_NO_POINTS = np.empty((0, 2))
+
 
 @dataclass(slots=True)
 class Submap:
@@ -59,10 +61,38 @@ class ActiveSubmaps:
         """The submap to match against; None before the first scan."""
         return self.active[0] if self.active else None
 
+    @property
+    def starts_next(self) -> bool:
+        """Whether the next scan begins a submap."""
+        return not self.active or len(self.active[-1].nodes) >= self._num_range_data
+
     def insert(
-        self, node: int, pose: FloatArray, sensor: FloatArray, hits: FloatArray, free_ends: FloatArray
+        self,
+        node: int,
+        pose: FloatArray,
+        sensor: FloatArray,
+        hits: FloatArray,
+        free_ends: FloatArray,
+        *,
+        glass: FloatArray = _NO_POINTS,
+        known_glass: FloatArray = _NO_POINTS,
     ) -> tuple[list[Submap], Submap | None]:
         """Enter one scan given in the local frame.
+
+        Parameters
+        ----------
+        node : int
+            Number of the node.
+        pose : ndarray of float64, shape (3,)
+            Pose of the base, m and rad.
+        sensor : ndarray of float64, shape (2,)
+            Position of the laser, m.
+        hits, free_ends : ndarray of float64, shape (n, 2), (m, 2)
+            Returns and ends of free space, m.
+        glass : ndarray of float64, shape (k, 2)
+            Points whose cells are locked in every submap the scan goes into, m.
+        known_glass : ndarray of float64, shape (l, 2)
+            Points whose cells are locked from the start in a submap that the scan begins, m.
 
         Returns
         -------
@@ -71,12 +101,14 @@ class ActiveSubmaps:
         finished : Submap or None
             The submap that this scan completed.
         """
-        if not self.active or len(self.active[-1].nodes) >= self._num_range_data:
+        if self.starts_next:
             grid = ProbabilityGrid(self._resolution, self._odds)
+            grid.lock(known_glass)
             self.active.append(Submap(self._created, np.array(pose), grid))
             self._created += 1
         entered = list(self.active)
         for submap in entered:
+            submap.grid.lock(glass)
             submap.grid.insert(sensor, hits, free_ends)
             submap.nodes.append(node)
         finished = None

@@ -23,23 +23,56 @@ def make_detector(config: GlassConfig) -> Detector | None:
     Raises
     ------
     ConfigError
-        `calibrated_peak` without a shipped calibration of that name.
+        `calibrated_peak` without a shipped calibration of that name; by the detector, a first scan that
+        does not fit the calibration of the configuration.
     """
     if config.detector == "off":
         return None
+    find = _finder(config)
+    if config.calibration is None:
+        return find
+    return _Checked(Calibration.from_dict(config.calibration), find)
+
+
+def _finder(config: GlassConfig) -> Detector:
     if config.detector == "narrow_return":
         return _narrow
     if config.detector == "calibrated_peak":
-        return partial(_calibrated, _calibration(config.sensor))
+        return calibrated(_calibration(config))
     return partial(_peak, config)
 
 
-def _calibration(sensor: str) -> Calibration:
-    if sensor not in PROFILES:
+class _Checked:
+    """A detector that makes sure that the first scan is of the sensor that was calibrated."""
+
+    def __init__(self, calibration: Calibration, find: Detector) -> None:
+        self._calibration, self._find = calibration, find
+        self._is_checked = False
+
+    def __call__(self, scan: LaserScan) -> Detection | None:
+        if not self._is_checked:
+            if reason := self._calibration.mismatch(len(scan.ranges), scan.angle_increment):
+                raise ConfigError(
+                    f"glass.calibration: {reason}", "calibrate this sensor, or map without the calibration"
+                )
+            self._is_checked = True
+        return self._find(scan)
+
+
+def calibrated(calibration: Calibration) -> Detector:
+    """`calibrated_peak` with a calibration, as a function of a scan."""
+    return partial(_calibrated, calibration)
+
+
+def _calibration(config: GlassConfig) -> Calibration:
+    if config.calibration is not None:
+        return Calibration.from_dict(config.calibration)
+    if config.sensor not in PROFILES:
         raise ConfigError(
-            f"glass.sensor: no calibration named {sensor!r} is shipped", f"known are {', '.join(PROFILES)}"
+            f"glass.sensor: no calibration named {config.sensor!r} is shipped",
+            f"known are {', '.join(PROFILES)}",
         )
-    return load_profile(sensor)
+    return load_profile(config.sensor)
 
 
 def _narrow(scan: LaserScan) -> Detection | None:

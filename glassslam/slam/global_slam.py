@@ -7,7 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 
 from glassslam.config import Config
-from glassslam.geometry import between, compose
+from glassslam.geometry import between, compose, inverse
 from glassslam.grid.submap import Submap
 from glassslam.posegraph import PoseGraph
 from glassslam.posegraph.consistency import prune_closures
@@ -109,6 +109,13 @@ class GlobalSlam:
     def poses(self) -> FloatArray:
         """Poses of all nodes in the map frame, shape (n, 3)."""
         return self.graph.poses
+
+    @property
+    def map_from_local(self) -> FloatArray:
+        """Where the local frame lies in the map by the last node, shape (3,), m and rad."""
+        if not self.nodes:
+            return np.zeros(3)
+        return compose(self.graph.poses[-1], inverse(self.nodes[-1].pose_in_local))
 
     def residuals(self) -> dict[str, float]:
         """Root mean square residuals of the closures in use, m and rad."""

@@ -1,7 +1,9 @@
 """Local SLAM: every scan is matched against the active submap, some become nodes."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from glassslam.matching.correlative import search_around
 from glassslam.matching.gradient import MatchResult, match_scan
 from glassslam.records import FloatArray
 from glassslam.slam.extrapolator import Prediction
+from glassslam.slam.glass_locks import GlassLocks, miss_probability
 from glassslam.slam.motion_filter import MotionFilter
 from glassslam.slam.node import Node
 from glassslam.slam.range_data import RangeData, thin, thin_adaptively
@@ -27,6 +30,8 @@ _LOST_AFTER_GAP = 1.05
 _SETTLING_SCANS = 5
 _LOST_WINDOW, _LOST_TURN = 1.5, 2.0
 _LOST_SCORE = 0.5
+_NO_POINTS = np.empty((0, 2))
+Points: TypeAlias = Callable[[], FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +64,15 @@ class LocalSlam:
     searches, searches_taken, coasted, unmatched : int
         Correlative searches made and believed, odometry jumps overruled by constant velocity, and
         scans with too few returns to match.
+    locks : GlassLocks
+        Glass to be locked in the submaps, by the schemes that do so.
     """
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        odds = OddsModel(config.submap.hit_probability, config.submap.miss_probability)
+        odds = OddsModel(config.submap.hit_probability, miss_probability(config))
         self._submaps = ActiveSubmaps(config.submap.resolution, odds, config.submap.num_range_data)
+        self.locks = GlassLocks(config)
         self._motion_filter = MotionFilter(config.motion_filter)
         self._usual_residual = 0.5
         self._scans = 0
@@ -74,8 +82,19 @@ class LocalSlam:
         self.searches = self.searches_taken = self.coasted = self.unmatched = 0
         self.relocalisations = self.relocalised = 0
 
-    def add(self, data: RangeData, prediction: Prediction) -> LocalResult:
-        """Match one scan and enter it when the motion filter admits it."""
+    def add(self, data: RangeData, prediction: Prediction, glass: Points = lambda: _NO_POINTS) -> LocalResult:
+        """Match one scan and enter it when the motion filter admits it.
+
+        Parameters
+        ----------
+        data : RangeData
+            The scan.
+        prediction : Prediction
+            Where it is expected.
+        glass : callable
+            Points of glass seen in it, ndarray of float64, shape (k, 2), frame of the base, m; asked for only
+            when the scan becomes a node.
+        """
         pose, residual = self._match(data, prediction)
         scan = self._scans
         self._scans += 1
@@ -83,16 +102,19 @@ class LocalSlam:
             return LocalResult(pose, None, [], None)
         node = Node(
             self._nodes, scan, data.stamp, pose, data.sensor, data.returns.astype(np.float32),
-            data.free_ends.astype(np.float32), residual, self._doubtful,
+            data.free_ends.astype(np.float32), residual, self._doubtful, data.ghosts.astype(np.float32),
         )  # fmt: skip
         self._nodes += 1
         self._doubtful = False
+        seen = glass() if self.locks.is_on else _NO_POINTS
         entered, finished = self._submaps.insert(
             node.index,
             pose,
             transform_points(pose, data.sensor[None])[0],
             transform_points(pose, data.returns),
             transform_points(pose, data.free_ends),
+            glass=self.locks.seen(transform_points(pose, seen)),
+            known_glass=self.locks.known(pose) if self._submaps.starts_next else _NO_POINTS,
         )
         return LocalResult(pose, node, entered, finished)
 
@@ -208,4 +230,5 @@ class LocalSlam:
 
 def prepared(data: RangeData, voxel_edge: float) -> RangeData:
     """The scan with its returns thinned by the first voxel filter."""
-    return RangeData(data.stamp, data.sensor, thin(data.returns, voxel_edge), data.free_ends)
+    returns, ghosts = thin(data.returns, voxel_edge), thin(data.ghosts, voxel_edge)
+    return RangeData(data.stamp, data.sensor, returns, data.free_ends, ghosts)

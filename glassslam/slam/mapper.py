@@ -6,15 +6,15 @@ import numpy as np
 
 from glassslam.config import Config
 from glassslam.errors import NoScansError
-from glassslam.glass.layer import GlassLayer
+from glassslam.geometry import compose
 from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
 from glassslam.slam.extrapolator import PoseExtrapolator
 from glassslam.slam.glass_watch import GlassWatch
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalResult, LocalSlam, prepared
 from glassslam.slam.range_data import prepare
-from glassslam.slam.render import render, with_glass
-from glassslam.slam.result import MapResult, OccupancyMap
+from glassslam.slam.render import Rendering, render_run
+from glassslam.slam.result import MapResult
 from glassslam.slam.scan_check import defect, mended, sweep_time
 from glassslam.slam.scan_queue import ScanQueue, TimedScan
 from glassslam.slam.stopwatch import Stages
@@ -53,8 +53,9 @@ class Mapper:
         self._local = LocalSlam(self._config)
         self._global = GlobalSlam(self._config, self._stages)
         self._poses: list[FloatArray] = []
+        self._corrections: list[FloatArray] = []
         self._tally = Tally()
-        self._glass = GlassWatch(self._config.glass, self._base_from_laser)
+        self._glass = GlassWatch(self._config.glass, self._base_from_laser, self._config.sensor)
 
     def add(self, record: Record) -> None:
         """Take one record, in the order of the recording."""
@@ -88,11 +89,12 @@ class Mapper:
             self._global.finish()
         finally:
             self.close()
-        with self._stages.measure("rendering"):
-            grid = render(self._global.nodes, self._global.poses, self._config.map)
         with self._stages.measure("glass"):
-            glass = self._glass.layer(self._global.nodes, self._global.poses)
-        return self._result(grid if glass is None else with_glass(grid, glass), info, glass)
+            self._glass.settle()
+            layer = self._glass.layer(self._global.nodes, self._global.poses)
+        with self._stages.measure("rendering"):
+            rendering = render_run(self._global, layer, self._config)
+        return self._result(rendering, info)
 
     def close(self) -> None:
         """Stop background work; without `finish` this gives the run up."""
@@ -108,6 +110,7 @@ class Mapper:
 
     def _process(self, scans: Iterator[TimedScan]) -> None:
         """Local SLAM for all of them, then global SLAM for what came of it."""
+        self._local.locks.map_from_local = self._global.map_from_local
         with self._stages.measure("local SLAM"):
             placed = [self._place(scan) for scan in scans]
         for result in placed:
@@ -119,15 +122,18 @@ class Mapper:
     def _place(self, timed: TimedScan) -> LocalResult:
         scan, time, odometry = timed.scan, timed.time, timed.odometry_pose
         prediction = self._extrapolator.predict(time, odometry)
-        data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor)
-        result = self._local.add(prepared(data, self._config.filter.voxel_filter_size), prediction)
+        look = self._glass.look(scan, prediction.twist)
+        behind = None if self._config.glass.ghosts_in_matching else look.behind_glass()
+        data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor, behind)
+        thinned = prepared(data, self._config.filter.voxel_filter_size)
+        result = self._local.add(thinned, prediction, look.points)
         self._extrapolator.add_pose(
             time, result.pose_in_local, odometry, 0.5 * sweep_time(scan), prediction.twist
         )
         self._poses.append(result.pose_in_local)
-        if self._glass.is_on:
-            self._glass.add(scan, result)
-        self._tally.place(scan, len(data.returns), with_odometry=odometry is not None)
+        self._corrections.append(self._local.locks.map_from_local)
+        self._glass.add(look, result)
+        self._tally.place(scan, len(data.returns) + len(data.ghosts), with_odometry=odometry is not None)
         return result
 
     def _check_seen(self) -> None:
@@ -140,26 +146,29 @@ class Mapper:
                 f"used are ranges the scans call valid, from {limits.min_range:g} to {limits.max_range:g} m",
             )
 
-    def _result(self, grid: OccupancyMap, info: RecordingInfo | None, glass: GlassLayer | None) -> MapResult:
+    def _result(self, rendering: Rendering, info: RecordingInfo | None) -> MapResult:
         nodes = self._global.nodes
         poses = np.array(self._global.poses)
+        local, stamps = np.array(self._poses), np.array(self._tally.stamps)
         every = corrected_poses(
-            np.array(self._poses),
+            local,
             np.array([node.scan for node in nodes]),
             np.array([node.pose_in_local for node in nodes]),
             poses,
         )
         return MapResult(
-            map=grid,
-            trajectory=Trajectory(np.array(self._tally.stamps), every),
+            map=rendering.map,
+            trajectory=Trajectory(stamps, every),
+            local_trajectory=Trajectory(stamps, local),
+            partial_trajectory=Trajectory(stamps, compose(np.array(self._corrections), local)),
             node_stamps=np.array([node.stamp for node in nodes]),
             node_poses=poses,
             submap_nodes=tuple(submap.nodes[0] for submap in self._global.submaps),
             constraints=self._global.graph.constraints,
             config=self._config,
             statistics=run_statistics(
-                self._tally, self._extrapolator, self._local, self._global, self._stages
+                self._tally, self._extrapolator, self._local, self._global, self._stages, self._glass.choice
             ),
             info=info,
-            glass=glass,
+            glass=rendering.glass,
         )

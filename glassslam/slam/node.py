@@ -1,8 +1,14 @@
 """Nodes: the scans that are kept (trajectory nodes of Cartographer)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from glassslam.records import Float32Array, FloatArray
+
+
+def _no_points() -> Float32Array:
+    return np.empty((0, 2), dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +34,8 @@ class Node:
     doubtful : bool
         Whether the step from the node before was bridged rather than tracked: a gap in the recording, a
         relocalisation, or odometry overruled.
+    ghosts : ndarray of float32, shape (g, 2)
+        Returns from behind glass that are kept out of matching, in the frame of the base, m.
     """
 
     index: int
@@ -39,3 +47,9 @@ class Node:
     free_ends: Float32Array
     residual: float
     doubtful: bool = False
+    ghosts: Float32Array = field(default_factory=_no_points)
+
+    @property
+    def ends(self) -> Float32Array:
+        """Everything that came back, returns before ghosts, shape (n + g, 2), m."""
+        return np.concatenate((self.returns, self.ghosts)) if len(self.ghosts) else self.returns

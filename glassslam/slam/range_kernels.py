@@ -21,6 +21,7 @@ def beams_to_points(
     farthest: float,
     no_echo: float,
     ray_length: float,
+    errors: FloatArray,
     points: FloatArray,
     free: FloatArray,
 ) -> tuple[int, int]:
@@ -28,20 +29,26 @@ def beams_to_points(
 
     The base moves with a constant twist during the sweep. A reading of at least `farthest` or `no_echo`
     clears `ray_length`, but no farther than itself and `no_echo`; NaN, -inf, 0 and readings below `nearest`
-    say nothing.
+    say nothing. `errors` of the beams are bearing cosine and sine, lateral and range offset.
     """
     hits = silent = 0
+    erring = errors[0] != 0.0 or errors[1] != 0.0 or errors[2] != 0.0 or errors[3] != 0.0
     cosine, sine = math.cos(base_from_laser[2]), math.sin(base_from_laser[2])
     for k in range(ranges.shape[0]):
         r = np.float64(ranges[k])
         if not r > 0.0 or r < nearest:
             continue
         echo = r < farthest and r < no_echo
-        length = r if echo else min(r, no_echo, ray_length)
+        length = r + errors[3] if echo else min(r, no_echo, ray_length)
         if length <= 0.0:
             continue
         angle = angle_min + k * increment
-        lx, ly = length * math.cos(angle), length * math.sin(angle)
+        if erring:
+            angle += errors[0] * math.cos(angle) + errors[1] * math.sin(angle)
+        ca, sa = math.cos(angle), math.sin(angle)
+        lx, ly = length * ca, length * sa
+        if erring:
+            lx, ly = lx - errors[2] * sa, ly + errors[2] * ca
         bx = cosine * lx - sine * ly + base_from_laser[0]
         by = sine * lx + cosine * ly + base_from_laser[1]
         if time_increment != 0.0:

@@ -59,6 +59,8 @@ class RunStatistics:
         Reason -> number of found matches that were thrown away.
     residuals : dict
         Name -> value (for example "loop_translation_rms" in m).
+    glass_detector, glass_reason : str
+        Detector in use, "off" without one; why it is in use, or why there is none.
     warnings : list of str
         What a user should know, one line each.
     """
@@ -75,6 +77,8 @@ class RunStatistics:
     closures_accepted: int = 0
     closures_rejected: dict[str, int] = field(default_factory=dict)
     residuals: dict[str, float] = field(default_factory=dict)
+    glass_detector: str = "off"
+    glass_reason: str = ""
     warnings: list[str] = field(default_factory=list)
 
 
@@ -88,6 +92,10 @@ class MapResult:
         The rendered map.
     trajectory : Trajectory
         Pose of the robot base at every used scan, in the map frame, in the order of the recording.
+    local_trajectory : Trajectory
+        The same poses as local SLAM saw them, in the local frame.
+    partial_trajectory : Trajectory
+        The poses of local SLAM, each moved as the last optimisation before it said; map frame.
     node_stamps : ndarray of float64, shape (n,)
         Times of the nodes, s.
     node_poses : ndarray of float64, shape (n, 3)
@@ -108,6 +116,8 @@ class MapResult:
 
     map: OccupancyMap
     trajectory: Trajectory
+    local_trajectory: Trajectory
+    partial_trajectory: Trajectory
     node_stamps: FloatArray
     node_poses: FloatArray
     submap_nodes: tuple[int, ...]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from glassslam.records import LaserScan
 from glassslam.slam.extrapolator import PoseExtrapolator
+from glassslam.slam.glass_choice import DetectorChoice
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalSlam
 from glassslam.slam.result import RunStatistics
@@ -50,7 +51,12 @@ class Tally:
 
 
 def run_statistics(
-    tally: Tally, extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam, stages: Stages
+    tally: Tally,
+    extrapolator: PoseExtrapolator,
+    local: LocalSlam,
+    world: GlobalSlam,
+    stages: Stages,
+    glass: DetectorChoice,
 ) -> RunStatistics:
     """Everything the report tells of a finished run."""
     used, taken_out = world.closures()
@@ -71,7 +77,9 @@ def run_statistics(
         closures_accepted=used,
         closures_rejected=rejected,
         residuals=world.residuals(),
-        warnings=_warnings(tally, extrapolator, local),
+        glass_detector=glass.name,
+        glass_reason=glass.reason,
+        warnings=[*_warnings(tally, extrapolator, local), *glass.warnings],
     )
 
 

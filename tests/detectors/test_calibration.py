@@ -9,11 +9,12 @@ from scan_worlds import FLAT, SENSOR, STEP, bearings, inside, pane, wall
 
 from detectors.calibration import Calibration, PaneModel
 from detectors.diffuse import DiffuseCurve
-from detectors.diffuse_fit import fit_diffuse_curve, half_sample_mode, surface_samples
+from detectors.diffuse_fit import brightest_mode, fit_diffuse_curve, surface_samples
+from detectors.expectation import CalibrationScan
 from detectors.pane_lobe import faces, fit_pane_lobe
 from detectors.panes import find_pane, pane_profile
 from detectors.profiles import PROFILES, load_profile
-from detectors.proposals import CalibrationScan, propose
+from detectors.proposals import propose
 from detectors.rates import wilson
 from detectors.self_calibration import self_calibration
 
@@ -42,8 +43,8 @@ def test_what_is_missing_keeps_its_default():
     ("values", "message"),
     [
         ({"sensor": "x"}, "a calibration needs 'diffuse'"),
-        ({"sensor": "x", "diffuse": {"ranges": [1]}}, "a calibration needs 'levels'"),
-        ({"diffuse": {"ranges": [1], "levels": [1]}}, "not a calibration: .*sensor"),
+        ({"sensor": "x", "diffuse": {"ranges": [1]}}, "a calibration needs 'diffuse.levels'"),
+        ({"diffuse": {"ranges": [1], "levels": [1]}}, "a calibration needs 'sensor'"),
         (
             {"sensor": "x", "diffuse": {"ranges": [1], "levels": [1]}, "colour": 3},
             "not a calibration: .*colour",
@@ -128,9 +129,22 @@ def test_a_curve_needs_surfaces():
         fitted([(np.full(721, np.inf), np.zeros(721))])
 
 
-@given(st.lists(st.floats(-1.0, 1.0), min_size=0, max_size=20))
-def test_the_mode_is_where_most_values_are(outliers):
-    assert half_sample_mode(np.array([5.0] * 30 + outliers)) == 5.0
+@given(st.lists(st.floats(-5.0, 9.0), min_size=0, max_size=4))
+def test_the_mode_is_where_the_values_gather(outliers):
+    assert brightest_mode(np.array([5.0] * 30 + outliers)) == pytest.approx(5.0, abs=0.02)
+
+
+def test_of_two_modes_the_brighter_counts_though_it_is_smaller():
+    walls, seen_through_glass = np.full(40, 8.0), np.full(100, 7.2)
+    assert brightest_mode(np.concatenate((walls, seen_through_glass))) == pytest.approx(8.0)
+
+
+def test_a_few_bright_reflectors_are_no_mode():
+    assert brightest_mode(np.concatenate((np.full(100, 7.0), np.full(20, 9.0)))) == pytest.approx(7.0)
+
+
+def test_one_value_is_its_own_mode():
+    assert brightest_mode(np.array([3.25])) == 3.25
 
 
 def test_a_recording_calibrates_its_own_sensor():

@@ -76,12 +76,18 @@ def test_the_table_rises_from_clamp_to_clamp_and_starts_with_the_unknown():
     model = OddsModel(unknown_probability=0.4)
     table = model.table()
     assert table.dtype == np.float32
-    assert table.shape == (model.top + 1,)
+    assert table.shape == (model.top + 2,)
     assert table[0] == np.float32(0.4)
-    assert (np.diff(table[1:]) > 0).all()
+    assert (np.diff(table[1 : model.top + 1]) > 0).all()
     assert table[1] == pytest.approx(0.12, abs=1e-4)
     assert table[model.prior] == pytest.approx(0.5, abs=2e-4)
-    assert table[-1] == pytest.approx(0.98, abs=1e-4)
+    assert table[model.top] == pytest.approx(0.98, abs=1e-4)
+
+
+def test_a_locked_cell_reads_as_sure_as_any():
+    model = OddsModel()
+    assert model.locked == model.top + 1
+    assert model.table()[model.locked] == model.table()[model.top]
 
 
 @given(st.floats(0.01, 0.99))
