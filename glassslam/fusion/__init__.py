@@ -1,0 +1,1 @@
+"""Lidar and sonar joined: opinion pools, decision layers, revisited rays, and a filter of scans."""

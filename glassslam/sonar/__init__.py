@@ -1,0 +1,1 @@
+"""Sonar rings: poses of their sweeps, maps from their cones, glass that only they see."""

@@ -1,0 +1,94 @@
+"""All files made of a volume, written into one directory."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from glassslam.errors import OutputError, UsageError
+from glassslam.volume.octomap_file import write_octomap
+from glassslam.volume.octree import Octree
+from glassslam.volume.pictures import write_slices, write_top_view
+from glassslam.volume.ply import write_ply
+from glassslam.volume.projection import Band
+from glassslam.volume.storage import save_volume
+
+VOLUME_FILES = ("volume.npz", "volume.bt", "volume.ply", "volume.png", "slices.png")
+"""What is made of every volume."""
+
+
+def check_folder(directory: str | Path, *, overwrite: bool = False) -> Path:
+    """Make sure, before any work is done, that a volume may be written into a directory.
+
+    Raises
+    ------
+    UsageError
+        There is a volume already, which may not be replaced.
+    OutputError
+        It is a file.
+    """
+    target = Path(directory)
+    if target.exists() and not target.is_dir():
+        raise OutputError(f"{directory} is a file", "name a directory for the volume")
+    present = [name for name in VOLUME_FILES if (target / name).exists()]
+    if present and not overwrite:
+        raise UsageError(f"{directory} already holds {present[0]}", "use --overwrite to replace it")
+    return target
+
+
+def write_volume(
+    tree: Octree,
+    directory: str | Path,
+    *,
+    band: Band | None = None,
+    also: Callable[[Path], list[Path]] | None = None,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write `VOLUME_FILES`; each appears whole or not at all.
+
+    Parameters
+    ----------
+    tree : Octree
+        The volume.
+    directory : str or Path
+        Made when it does not exist; other files in it are left alone.
+    band : tuple of float, optional
+        Heights shown in the pictures, m; all when left out.
+    also : callable, optional
+        Given a folder, writes more files into it, and names them.
+    overwrite : bool
+        Whether an earlier volume there may be replaced.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    UsageError, OutputError
+        As by `check_folder`; or the volume is empty, or something cannot be written.
+    """
+    target = check_folder(directory, overwrite=overwrite)
+    writers: tuple[Callable[[Path], Path], ...] = (
+        lambda path: save_volume(tree, path),
+        lambda path: write_octomap(tree, path),
+        lambda path: write_ply(tree, path),
+        lambda path: write_top_view(tree, path, band),
+        lambda path: write_slices(tree, path, band),
+    )
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".volume.", dir=target) as staged:
+            paths = [write(Path(staged) / name) for name, write in zip(VOLUME_FILES, writers, strict=True)]
+            paths += also(Path(staged)) if also else []
+            return [_publish(path, target / path.name) for path in paths]
+    except OSError as error:
+        raise OutputError(f"cannot write {directory}: {error.strerror or error}") from error
+
+
+def _publish(staged: Path, final: Path) -> Path:
+    with staged.open("rb") as file:
+        os.fsync(file.fileno())
+    staged.replace(final)
+    return final
