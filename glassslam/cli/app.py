@@ -22,7 +22,9 @@ from glassslam.errors import GlassSlamError, UsageError
 COMMANDS = {
     "map": ("glassslam.cli.map", "map_command", "Make a map from a recording."),
     "inspect": ("glassslam.cli.inspect", "inspect", "Show what is in a recording and what map would use."),
+    "calibrate": ("glassslam.cli.calibrate", "calibrate_command", "Calibrate a lidar for glass."),
     "evaluate": ("glassslam.cli.evaluate", "evaluate", "Compare a trajectory with the truth."),
+    "volume": ("glassslam.cli.volume", "volume", "Make a 3D map from lidar and ultrasonic points."),
     "simulate": ("glassslam.cli.simulate", "simulate", "Write a recording of a simulated building."),
     "demo": ("glassslam.cli.demo", "demo", "Simulate a recording, map it, evaluate it."),
     "config": ("glassslam.cli.config", "config", "Print or compare configurations."),

@@ -6,6 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from glassslam.cli.evaluate_beams import (
+    LabelFile,
+    beam_errors,
+    beam_line,
+    beam_table,
+    label_file,
+    plain_beam_errors,
+)
+from glassslam.cli.evaluate_image import Resolution, TruthMap, alignment_line, map_errors, map_table
 from glassslam.errors import UsageError
 
 if TYPE_CHECKING:
@@ -19,6 +28,8 @@ EXAMPLES = """\
   glassslam evaluate run-map --trajectory truth.tum
   glassslam evaluate other.tum --relations intel.relations --json
   glassslam evaluate run-map --glass glass.geojson
+  glassslam evaluate run-map --glass run.bag.truth.glass.geojson --labels run.bag.truth.labels.npz
+  glassslam evaluate run-map --truth run.bag.truth.map.yaml
 """
 
 Results = Annotated[
@@ -56,6 +67,9 @@ def evaluate(
     relations: RelationFile = None,
     trajectory: TrajectoryFile = None,
     glass: GlassFile = None,
+    labels: LabelFile = None,
+    truth: TruthMap = None,
+    resolution: Resolution = None,
     align: Align = False,
     json: Json = False,
     verbose: Verbose = False,
@@ -65,14 +79,24 @@ def evaluate(
     The error of a relation is inv(true) * estimated; means and standard deviations in m and deg.
     A trajectory is aligned without scale (ATE) and compared step by step (RPE over 1 pose and 1 m).
     Glass counts as found where a wall is within 0.10, 0.15 or 0.25 m of it, by points every centimetre.
+    Labels of beams are counted one by one; intervals are of 95 %.
+    A true map is laid onto the map; MSE of grey values 0 to 255, SSIM, NCC, and the overlap of each class.
     """
-    if relations is None and trajectory is None and glass is None:
-        raise UsageError("nothing to compare with", "give --relations FILE, --trajectory TUM or --glass FILE")
+    if all(given is None for given in (relations, trajectory, glass, labels, truth)):
+        raise UsageError(
+            "nothing to compare with", "give --relations FILE, --trajectory TUM, --glass FILE or --truth MAP"
+        )
+    if resolution is not None and truth is None:
+        raise UsageError("--resolution needs --truth", "it is the cell size of a picture")
     if align and glass is None:
         raise UsageError("--align needs --glass", "a trajectory is always aligned")
     errors = _errors(results, relations, trajectory, verbose)
     if glass is not None:
         errors["glass"] = _glass_errors(results, glass, align)
+    if (true_labels := label_file(results, glass, labels)) is not None:
+        errors["beams"] = beam_errors(results, true_labels)
+    if truth is not None:
+        errors["image"] = map_errors(results, truth, resolution)
     _show(errors, json)
 
 
@@ -98,11 +122,17 @@ def _show(errors: dict[str, Any], as_json: bool) -> None:
     from glassslam.cli.terminal import emit, emit_rich  # noqa: PLC0415
 
     if as_json:
-        emit(dumps({name: asdict(error) for name, error in errors.items()}, indent=2) + "\n")
+        plain = {name: plain_beam_errors if name == "beams" else asdict for name in errors}
+        emit(dumps({name: plain[name](error) for name, error in errors.items()}, indent=2) + "\n")
         return
-    emit("".join(line for name, error in errors.items() if name != "glass" for line in _lines(name, error)))
+    listed = {name: error for name, error in errors.items() if name not in {"glass", "beams", "image"}}
+    emit("".join(line for name, error in listed.items() for line in _lines(name, error)))
     if "glass" in errors:
         emit_rich(_glass_table(errors["glass"]), _glass_line(errors["glass"]))
+    if "beams" in errors:
+        emit_rich(beam_table(errors["beams"]), beam_line(errors["beams"]))
+    if "image" in errors:
+        emit_rich(map_table(errors["image"]), alignment_line(errors["image"]))
 
 
 def _glass_errors(results: Path, path: Path, align: bool) -> "GlassErrors":

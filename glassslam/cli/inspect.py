@@ -8,19 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from glassslam.cli.map import Sonar, SonarRing, SonarTopic
+
 if TYPE_CHECKING:
     from glassslam.sources.report import (
         OdometryReport,
         RecordingReport,
         ScanReport,
-        StampReport,
         TransformReport,
     )
+    from glassslam.sources.sonarreport import SonarReport, StampReport
 
 EXAMPLES = """\
   glassslam inspect run.bag
   glassslam inspect rosbag2_2026_02_02/            a ROS 2 directory
   glassslam inspect run.clf.gz --json              for scripts
+  glassslam inspect run.bag --sonar sonar.txt      with sonar from a second file
 """
 
 Rows = Iterator[tuple[str, str]]
@@ -29,19 +32,28 @@ Recordings = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORDING...",
-        help="ROS 1 bag, ROS 2 bag (file or directory), mcap or CARMEN log; several follow each other.",
+        help="ROS 1 or 2 bag (file or directory), mcap, CARMEN or Player log; several follow each other.",
         show_default=False,
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the report as JSON.")]
 
 
-def inspect(recordings: Recordings, json: Json = False) -> None:
-    """Show topics, times, scan geometry, silent beams, intensities, frames, and what map would use."""
+def inspect(
+    recordings: Recordings,
+    sonar: Sonar = None,
+    sonar_topic: SonarTopic = None,
+    sonar_ring: SonarRing = None,
+    json: Json = False,
+) -> None:
+    """Show topics, times, scan geometry, silent beams, intensities, sonar, frames, and what map would use."""
     from glassslam.cli.terminal import emit, emit_rich  # noqa: PLC0415
-    from glassslam.sources.inspection import inspect_recording  # noqa: PLC0415  (loads numpy)
+    from glassslam.sources import SourceOptions  # noqa: PLC0415  (loads numpy)
+    from glassslam.sources.inspection import inspect_recording  # noqa: PLC0415
 
-    report = inspect_recording(recordings)
+    wishes = tuple(sonar_topic) if sonar_topic else None
+    options = SourceOptions(sonar=sonar, sonar_topic=wishes, sonar_ring=sonar_ring)
+    report = inspect_recording(recordings, options)
     if json:
         from json import dumps  # noqa: PLC0415
 
@@ -80,6 +92,8 @@ def rows(report: "RecordingReport") -> Rows:
     for imu in report.imus:
         yield f"imu {imu.topic}", f"frame {imu.frame_id or '(none)'}, {_times(imu.stamps)}"
         yield "", f"yaw rate mean {imu.yaw_rate_mean:.4f}, extreme {imu.yaw_rate_extreme:.3f} rad/s"
+    for sonar in report.sonars:
+        yield from _sonar_rows(sonar)
     for number, edge in enumerate(report.transforms):
         yield "" if number else "frames", _transform(edge)
     for reason, count in report.dropped.items():
@@ -128,6 +142,27 @@ def _odometry_rows(odometry: "OdometryReport") -> Rows:
     yield "", f"path {odometry.path_length:.1f} m, turning {odometry.turning:.1f} rad"
 
 
+def _sonar_rows(sonar: "SonarReport") -> Rows:
+    yield f"sonar {_listed(sonar.topics)}", _times(sonar.stamps)
+    if sonar.sonars:
+        limits = f"limits {sonar.range_min:g} to {sonar.limit:g} m"
+        yield "", f"{sonar.sonars} sonars, ring {sonar.ring}, {limits}"
+        shares = sonar.shares
+        repeats = f"each measures every {sonar.cycle:.2f} s" if sonar.cycle else "each message measures"
+        yield "", f"{repeats}; {shares['not_new']:.1%} of the ranges are not new"
+        yield "", f"of the new ones {shares['echo']:.1%} echo, {shares['no_echo']:.1%} no echo"
+    else:
+        yield "", f"3D points, {sonar.points_per_message:.1f} a message"
+    if not math.isnan(sonar.percentiles[1]):
+        near, middle, far = sonar.percentiles
+        yield "", f"distances 5 / 50 / 95 %: {near:.2f} / {middle:.2f} / {far:.2f} m"
+
+
+def _listed(topics: tuple[str, ...]) -> str:
+    """All topics, or the first and the last of many."""
+    return ", ".join(topics) if len(topics) < 4 else f"{topics[0]} ... {topics[-1]} ({len(topics)} topics)"
+
+
 def _times(stamps: "StampReport") -> str:
     parts = [f"{stamps.count} messages", f"every {stamps.period * 1e3:.1f} ms"]
     if stamps.backward:
@@ -161,5 +196,7 @@ def _plan_rows(report: "RecordingReport") -> Rows:
         return
     x, y, yaw = plan.base_from_laser
     yield "map would use", f"scans {plan.scan_topic}, odometry {plan.odom_topic or 'none'}"
+    if plan.sonar_topics:
+        yield "", f"sonar {_listed(plan.sonar_topics)}" + (plan.sonar_ring and f", ring {plan.sonar_ring}")
     imu = f"imu {plan.imu_topic or 'none'}"
     yield "", f"{imu}, laser at x {x:.3f} y {y:.3f} m, yaw {math.degrees(yaw):.2f} deg on the robot"

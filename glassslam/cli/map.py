@@ -9,6 +9,8 @@ EXAMPLES = """\
   glassslam map run.bag                             results in run-map/
   glassslam map run.bag -o office --overwrite       replace earlier results
   glassslam map run.bag --sensor ust10lx            find glass walls as well
+  glassslam map run.bag --calibration mine/         the same with a lidar calibrated before
+  glassslam map run.bag --sonar sonar.txt           take sonar from a second file
   glassslam map part1.bag part2.bag -o office       recordings that follow each other
   glassslam map run.mcap --scan-topic /front/scan   choose among several lidars
   glassslam map run.bag --laser-pose 0.1,0,0        the laser sits 0.1 m ahead of the centre
@@ -20,7 +22,7 @@ Recordings = Annotated[
     list[Path],
     typer.Argument(
         metavar="RECORDING...",
-        help="ROS 1 bag, ROS 2 bag (file or directory), mcap or CARMEN log; several follow each other.",
+        help="ROS 1 or 2 bag (file or directory), mcap, CARMEN or Player log; several follow each other.",
         show_default=False,
     ),
 ]
@@ -43,10 +45,33 @@ Sensor = Annotated[
         help="Look for glass with a lidar of this kind: utm30lx, ust10lx, tim781, lms511 or rplidar.",
     ),
 ]
+CalibrationFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration",
+        metavar="FILE",
+        help="Look for glass with the calibration of this lidar; see calibrate.",
+    ),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in DIR.")]
 ScanTopic = Annotated[str | None, typer.Option(help="Topic of the laser scans.", metavar="TOPIC")]
 OdomTopic = Annotated[str | None, typer.Option(help="Topic of the odometry; tf, or none.", metavar="TOPIC")]
 ImuTopic = Annotated[str | None, typer.Option(help="Topic of the IMU, or none.", metavar="TOPIC")]
+Sonar = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="File with sonar readings: bag, Player log or pi-map text log."),
+]
+SonarTopic = Annotated[
+    list[str] | None,
+    typer.Option(metavar="TOPIC", help="Topic of the sonars, or none; may be repeated."),
+]
+SonarRing = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="Where the sonars sit: pioneer-3dx, pioneer-2dx, turtlebot-9 or a YAML file.",
+    ),
+]
 LaserPose = Annotated[
     str | None, typer.Option(metavar="X,Y,YAW", help="Pose of the laser on the robot, m and rad.")
 ]
@@ -68,10 +93,14 @@ def map_command(
     config: ConfigFile = None,
     assignments: Assignments = None,
     sensor: Sensor = None,
+    calibration: CalibrationFile = None,
     overwrite: Overwrite = False,
     scan_topic: ScanTopic = None,
     odom_topic: OdomTopic = None,
     imu_topic: ImuTopic = None,
+    sonar: Sonar = None,
+    sonar_topic: SonarTopic = None,
+    sonar_ring: SonarRing = None,
     laser_pose: LaserPose = None,
     start: Start = 0.0,
     duration: Duration = None,
@@ -89,6 +118,7 @@ def map_command(
 
     stopwatch = Stopwatch()
     from glassslam.cli.settings import (  # noqa: PLC0415
+        calibration_assignments,
         default_directory,
         parse_pose,
         resolve_config,
@@ -99,7 +129,14 @@ def map_command(
     check_directory(directory, overwrite=overwrite)
     pose, resolved = (
         parse_pose(laser_pose),
-        resolve_config(config, [*sensor_assignments(sensor), *(assignments or ())]),
+        resolve_config(
+            config,
+            [
+                *sensor_assignments(sensor),
+                *calibration_assignments(calibration, sensor),
+                *(assignments or ()),
+            ],
+        ),
     )
     from glassslam.sources import SourceOptions  # noqa: PLC0415  (loads rosbags)
 
@@ -112,6 +149,9 @@ def map_command(
         duration=duration,
         every=every,
         echo=echo,  # type: ignore[arg-type]  # other words are refused by SourceOptions
+        sonar=sonar,
+        sonar_topic=tuple(sonar_topic) if sonar_topic else None,
+        sonar_ring=sonar_ring,
     )
     return _run(recordings, directory, resolved, options, stopwatch, overwrite, json, quiet)
 
@@ -128,10 +168,12 @@ def _run(
 ) -> int:
     from glassslam.api import map_recording  # noqa: PLC0415  (loads numba and casadi)
     from glassslam.cli.progress import progress_bar  # noqa: PLC0415
+    from glassslam.cli.settings import calibration_warnings  # noqa: PLC0415
     from glassslam.outputs import build_report, write_results  # noqa: PLC0415
 
     with progress_bar(quiet=quiet) as progress:
         result = map_recording(recordings, config, source_options=options, progress=progress)
+    result.statistics.warnings[:0] = calibration_warnings(config)
     written = write_results(result, directory, overwrite=overwrite, stopwatch=stopwatch)
     report = build_report(result, stopwatch.read())
     if json:

@@ -56,6 +56,44 @@ def sensor_assignments(sensor: str | None) -> list[str]:
     return ["glass.detector=calibrated_peak", f"glass.sensor={sensor}"]
 
 
+def calibration_assignments(file: Path | None, sensor: str | None) -> list[str]:
+    """Assignments that look for glass with a calibration, which becomes part of the configuration.
+
+    Raises
+    ------
+    UsageError
+        A kind of lidar is named as well.
+    ConfigError
+        The file is no calibration, or an entry of it is wrong.
+    """
+    if file is None:
+        return []
+    if sensor is not None:
+        raise UsageError("--calibration and --sensor exclude each other", "a calibration is of one sensor")
+    from glassslam.calibration.files import read_calibration  # noqa: PLC0415  (loads numba)
+
+    calibration = read_calibration(file)
+    values: dict[str, Any] = {"detector": calibration.detector, "calibration": calibration.to_dict()}
+    plain = {"thresh": calibration.thresh, "grad": calibration.grad, "width": calibration.width}
+    if all(plain.values()):
+        values |= plain
+    return [f"glass.{name}={_on_one_line(value)}" for name, value in values.items()]
+
+
+def calibration_warnings(config: Config) -> list[str]:
+    """That a calibration was given but rules out that glass is seen; empty otherwise."""
+    glass = config.glass
+    if glass.calibration is None or glass.detector != "off" or glass.calibration["detector"] != "off":
+        return []
+    name = glass.calibration["sensor"]
+    return [f"glass is not looked for: by its calibration the intensities of {name} cannot show it"]
+
+
+def _on_one_line(value: Any) -> str:
+    # quoted where YAML would read something else: `off` is no text but false
+    return yaml.safe_dump(value, default_flow_style=True, width=math.inf).removesuffix("...\n").strip()
+
+
 def _assign(data: dict[str, Any], assignment: str) -> None:
     name, equals, text = assignment.partition("=")
     *sections, last = name.strip().split(".")
@@ -93,9 +131,9 @@ def parse_pose(text: str | None) -> tuple[float, float, float] | None:
     return x, y, yaw
 
 
-def default_directory(recordings: Sequence[Path]) -> Path:
+def default_directory(recordings: Sequence[Path], kind: str = "map") -> Path:
     """Name of the results directory when none is given: NAME-map in the working directory."""
     name = recordings[0].resolve().name
     for suffix in (".gz", ".bag", ".mcap", ".db3", ".clf", ".log"):
         name = name.removesuffix(suffix) or name
-    return Path(f"{name}-map")
+    return Path(f"{name}-{kind}")

@@ -17,6 +17,7 @@ EXAMPLES = """\
   glassslam simulate office -o office.bag
   glassslam simulate office -o office.bag --sensor rplidar --seed 3
   glassslam simulate glass_building_1 -o glass.bag --rate 20
+  glassslam simulate pimap_4_hallway -o hall.bag --sonar pioneer-3dx
   glassslam simulate my_floor.yaml -o my_floor.bag --overwrite
 """
 
@@ -31,6 +32,14 @@ Sensor = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="ust10lx, utm30lx, lms200 or rplidar [default: that of the scene]."),
 ]
+Sonar = Annotated[
+    str | None,
+    typer.Option(
+        metavar="RING",
+        help="Also a ring of sonars: pioneer-3dx, pioneer-2dx, turtlebot-9 or a YAML file [default: none].",
+        show_default=False,
+    ),
+]
 Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of all noise: same seed, same bytes.")]
 Rate = Annotated[
     float | None,
@@ -44,6 +53,7 @@ def simulate(
     scene: SceneName,
     output: Bag,
     sensor: Sensor = None,
+    sonar: Sonar = None,
     seed: Seed = 0,
     rate: Rate = None,
     overwrite: Overwrite = False,
@@ -52,7 +62,8 @@ def simulate(
     """Write a recording of a robot driving through a simulated building.
 
     Beside the bag stand the true pose at every scan (BAG.truth.tum), the true walls (BAG.truth.json),
-    the true glass (BAG.truth.glass.geojson) and what every beam met (BAG.truth.labels.npz).
+    the true glass (BAG.truth.glass.geojson), what every beam met (BAG.truth.labels.npz) and the true map
+    (BAG.truth.map.yaml), which evaluate --truth reads.
     """
     from glassslam.cli.terminal import emit  # noqa: PLC0415
     from glassslam.simulation import Scene, find_scene  # noqa: PLC0415  (loads numba)
@@ -60,7 +71,7 @@ def simulate(
 
     if output.exists() and not overwrite:
         raise UsageError(f"{output} exists already", "use --overwrite to replace it")
-    simulation = prepare(Scene.load(find_scene(scene)), sensor, seed, rate)
+    simulation = prepare(Scene.load(find_scene(scene)), sensor, seed, rate, sonar)
     written = record(simulation, output, quiet=json)
     if json:
         from json import dumps  # noqa: PLC0415
@@ -83,7 +94,10 @@ def describe(simulation: "Simulation", written: "WrittenRecording") -> str:
     seconds = float(simulation.motion.times[-1])
     scans = f"{written.scans} scans of a {simulation.sensor.name}"
     lines = [f"simulated {simulation.scene.name}: {scans}, {simulation.driven:.1f} m in {seconds:.0f} s"]
-    paths = (written.bag, written.true_trajectory, written.true_plan, written.true_labels, written.true_glass)
+    paths = (
+        *(written.bag, written.true_trajectory, written.true_plan, written.true_labels, written.true_glass),
+        *(written.true_map, written.true_image, written.true_classes),
+    )
     return "".join(f"{line}\n" for line in (*lines, *(f"wrote {path}" for path in paths)))
 
 
@@ -94,8 +108,12 @@ def _summary(simulation: "Simulation", written: "WrittenRecording") -> dict[str,
         "true_plan": str(written.true_plan),
         "true_labels": str(written.true_labels),
         "true_glass": str(written.true_glass),
+        "true_map": str(written.true_map),
+        "true_image": str(written.true_image),
+        "true_classes": str(written.true_classes),
         "scene": simulation.scene.name,
         "sensor": simulation.sensor.name,
+        "sonar": None if simulation.sonar is None else simulation.sonar.ring.name,
         "seed": simulation.seed,
         "scans": written.scans,
         "driven_m": round(simulation.driven, 3),

@@ -4,7 +4,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,7 +20,7 @@ RESULT_FILES = (
     "report.json",
 )
 """What every run writes."""
-GLASS_FILES = ("glass.geojson", "labels.png")
+GLASS_FILES = ("glass.geojson", "glass_beams.npz", "labels.png")
 """What a run that looks for glass writes as well."""
 
 _HINTS = {
@@ -33,7 +33,9 @@ _HINTS = {
 }
 
 
-def check_directory(directory: str | Path, *, overwrite: bool = False) -> Path:
+def check_directory(
+    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = RESULT_FILES + GLASS_FILES
+) -> Path:
     """Make sure, before any work is done, that results may be written to a directory.
 
     Parameters
@@ -42,6 +44,8 @@ def check_directory(directory: str | Path, *, overwrite: bool = False) -> Path:
         Where the results shall be; need not exist.
     overwrite : bool
         Whether earlier results there may be replaced.
+    files : sequence of str
+        Names of the files that are results.
 
     Returns
     -------
@@ -62,7 +66,7 @@ def check_directory(directory: str | Path, *, overwrite: bool = False) -> Path:
         present = sorted(entry.name for entry in target.iterdir()) if target.exists() else []
     except OSError as error:
         raise _unwritable(directory, error) from error
-    if foreign := [name for name in present if name not in RESULT_FILES + GLASS_FILES]:
+    if foreign := [name for name in present if name not in files]:
         raise OutputError(
             f"{directory} holds files that are no results: {', '.join(foreign[:3])}", "choose a new directory"
         )
@@ -84,7 +88,9 @@ def _check_parent(directory: str | Path, target: Path) -> None:
 
 
 @contextmanager
-def staged_directory(directory: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
+def staged_directory(
+    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = RESULT_FILES + GLASS_FILES
+) -> Iterator[Path]:
     """Lend a temporary folder which takes the place of `directory` when the block ends without error.
 
     Parameters
@@ -93,6 +99,8 @@ def staged_directory(directory: str | Path, *, overwrite: bool = False) -> Itera
         Where the results shall be.
     overwrite : bool
         Whether earlier results there may be replaced; they stay untouched until the new ones are whole.
+    files : sequence of str
+        Names of the files that are results.
 
     Yields
     ------
@@ -104,7 +112,7 @@ def staged_directory(directory: str | Path, *, overwrite: bool = False) -> Itera
     UsageError, OutputError
         As by `check_directory`; any OSError inside the block becomes an OutputError.
     """
-    target = check_directory(directory, overwrite=overwrite)
+    target = check_directory(directory, overwrite=overwrite, files=files)
     staged: Path | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

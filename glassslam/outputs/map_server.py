@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from glassslam.errors import OutputError
 from glassslam.outputs.table import read_text
+from glassslam.records import Float32Array
 from glassslam.slam.result import OccupancyMap
 
 OCCUPIED_THRESH = 0.65
@@ -95,13 +96,38 @@ def read_map(path: str | Path) -> OccupancyMap:
     fields = _read_fields(location)
     shade = _read_image(location.parent / str(fields["image"])) / 255.0
     occupied = shade if fields.get("negate") else 1.0 - shade
-    probability = np.full(shade.shape, np.nan, dtype=np.float32)
-    probability[occupied < fields["free_thresh"]] = 0.0
-    probability[occupied > fields["occupied_thresh"]] = 1.0
     x, y, yaw = fields["origin"]
     if not math.isclose(yaw, 0.0, abs_tol=1e-9):
         raise OutputError(f"{location}: the map is turned by {yaw} rad", "only maps with yaw 0 can be read")
-    return OccupancyMap(probability[::-1].copy(), fields["resolution"], (x, y))
+    probability = _trinary(occupied, fields["free_thresh"], fields["occupied_thresh"])
+    return OccupancyMap(probability, fields["resolution"], (x, y))
+
+
+def read_picture(path: str | Path, resolution: float) -> OccupancyMap:
+    """Read a picture of a map, with the thresholds of map_server and its lower left corner in the origin.
+
+    Parameters
+    ----------
+    path : str or Path
+        PGM, PNG, or what else OpenCV reads.
+    resolution : float
+        Edge of a cell, m.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read or is no picture.
+    """
+    occupied = 1.0 - _read_image(Path(path)) / 255.0
+    return OccupancyMap(_trinary(occupied, FREE_THRESH, OCCUPIED_THRESH), resolution, (0.0, 0.0))
+
+
+def _trinary(occupied: NDArray[np.float64], free: float, full: float) -> Float32Array:
+    """Probabilities, row 0 at the lowest y, of an image of occupancies."""
+    probability = np.full(occupied.shape, np.nan, dtype=np.float32)
+    probability[occupied < free] = 0.0
+    probability[occupied > full] = 1.0
+    return probability[::-1].copy()
 
 
 def _read_fields(location: Path) -> dict[str, Any]:

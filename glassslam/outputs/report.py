@@ -110,6 +110,7 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "columns": columns,
             "origin": list(result.map.origin),
         },
+        "glass": _glass(result),
         "warnings": list(statistics.warnings),
         "versions": versions(),
         "stages": {name: asdict(stage) for name, stage in statistics.stages.items()},
@@ -122,6 +123,28 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "real_time_factor": real_time_factor(statistics, usage.wall),
         }
     return _plain(report)  # type: ignore[no-any-return]
+
+
+def _glass(result: MapResult) -> dict[str, Any] | None:
+    """Glass in numbers; None where it was not looked for."""
+    if result.glass is None:
+        return None
+    from glassslam.glass.ghosts import MIRRORED, SEEN_THROUGH  # noqa: PLC0415  (loads numba)
+
+    layer, ghosts = result.glass, result.glass.ghosts
+    return {
+        "detector": result.statistics.glass_detector,
+        "reason": result.statistics.glass_reason,
+        "scheme": result.config.glass.scheme,
+        "walls": len(layer.walls),
+        "wall_length_m": sum(wall.length for wall in layer.walls),
+        "observations": len(layer.observations),
+        "locked_cells": len(layer.locked_cells),
+        "labelled_beams": 0 if layer.beams is None else len(layer.beams),
+        "returns_seen_through": 0 if ghosts is None else ghosts.count(SEEN_THROUGH),
+        "returns_mirrored": 0 if ghosts is None else ghosts.count(MIRRORED),
+        "ghost_cells": len(layer.ghost_cells),
+    }
 
 
 def versions() -> dict[str, str]:
@@ -140,6 +163,8 @@ def _plain(value: Any) -> Any:
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

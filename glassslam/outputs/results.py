@@ -69,7 +69,11 @@ def write_results(
 def _glass_files(result: MapResult, folder: Path) -> list[Path]:
     if result.glass is None:
         return []
+    from glassslam.outputs.beam_labels import write_beam_labels  # noqa: PLC0415  (loads the detectors)
+
+    beams = result.glass.beams
     return [
         write_glass(result.glass, folder / "glass.geojson"),
+        *([] if beams is None else [write_beam_labels(beams, folder / "glass_beams.npz")]),
         write_labels(result.map, result.glass, folder / "labels.png"),
     ]

@@ -41,21 +41,50 @@ class FloorPlan:
     lean: FloatArray
 
 
-def build_floor_plan(scene: Scene) -> FloorPlan:
-    """All segments of a scene, in the order of the file.
+class Piece(NamedTuple):
+    """One straight stretch, pane, mullion, box or post.
+
+    Attributes
+    ----------
+    name, material : str
+        What it belongs to and is made of.
+    outline : ndarray of float64, shape (n, 4)
+        Its sides: end points in the world frame, m.
+    z_low, z_high : float
+        From where to where it reaches, m.
+    lean_deg : float
+        Angle with the vertical, deg.
+    """
+
+    name: str
+    material: str
+    outline: FloatArray
+    z_low: float
+    z_high: float
+    lean_deg: float = 0.0
+
+
+def build_floor_plan(scene: Scene, band: tuple[float, float] | None = None) -> FloorPlan:
+    """The segments of a scene that reach into a band of heights, in the order of the file.
+
+    Parameters
+    ----------
+    scene : Scene
+        The world.
+    band : tuple of float, optional
+        Lowest and highest z, m; the plane of the lidar when omitted.
 
     Raises
     ------
     ConfigError
-        An opening lies beyond its wall or over another one, or a wall has no length.
+        An opening lies beyond its wall or over another one, a wall has no length, or nothing is that high.
     """
-    pieces: list[_Piece] = []
-    for wall in scene.walls:
-        pieces += _wall_pieces(wall)
-    for box in scene.boxes:
-        pieces += [_Piece(box.name, box.material, outline) for outline in _box_outlines(box)]
-    for post in scene.posts:
-        pieces += [_Piece(post.name, post.material, outline) for outline in _post_outlines(post)]
+    bottom, top = band or (scene.laser_height, scene.laser_height)
+    pieces = [piece for piece in scene_pieces(scene) if piece.z_low <= top and piece.z_high > bottom]
+    if not pieces:
+        raise ConfigError(
+            f"nothing of the scene reaches the height of {bottom:g} m", "check z_low and z_high"
+        )
     materials = tuple(dict.fromkeys(piece.material for piece in pieces))
     counts = [len(piece.outline) for piece in pieces]
     return FloorPlan(
@@ -67,11 +96,27 @@ def build_floor_plan(scene: Scene) -> FloorPlan:
     )
 
 
-class _Piece(NamedTuple):
-    name: str
-    material: str
-    outline: FloatArray
-    lean_deg: float = 0.0
+def scene_pieces(scene: Scene) -> list[Piece]:
+    """Everything a scene is made of, in the order of the file.
+
+    Raises
+    ------
+    ConfigError
+        An opening lies beyond its wall or over another one, or a wall has no length.
+    """
+    pieces: list[Piece] = []
+    for wall in scene.walls:
+        pieces += _wall_pieces(wall)
+    for box in scene.boxes:
+        pieces += [_piece(box, outline) for outline in _box_outlines(box)]
+    for post in scene.posts:
+        pieces += [_piece(post, outline) for outline in _post_outlines(post)]
+    return pieces
+
+
+def _piece(thing: Wall | Box | Post, outline: FloatArray) -> Piece:
+    lean_deg = thing.lean_deg if isinstance(thing, Wall) else 0.0
+    return Piece(thing.name, thing.material, outline, thing.z_low, thing.z_high, lean_deg)
 
 
 def _ring(corners: FloatArray) -> FloatArray:
@@ -79,11 +124,11 @@ def _ring(corners: FloatArray) -> FloatArray:
     return np.hstack((corners, np.roll(corners, -1, axis=0)))
 
 
-def _wall_pieces(wall: Wall) -> Iterator[_Piece]:
+def _wall_pieces(wall: Wall) -> Iterator[Piece]:
     for origin, direction, span, length in _stretches(wall):
         if wall.panes is None:
             outline = _face(origin, direction, _extended(wall, *span, length), wall.thickness)
-            yield _Piece(wall.name, wall.material, outline, wall.lean_deg)
+            yield _piece(wall, outline)
         else:
             yield from _pane_pieces(
                 wall, wall.panes, origin + span[0] * direction, direction, span[1] - span[0]
@@ -106,7 +151,7 @@ def _stretches(wall: Wall) -> Iterator[tuple[FloatArray, FloatArray, tuple[float
 
 def _pane_pieces(
     wall: Wall, panes: Panes, origin: FloatArray, direction: FloatArray, length: float
-) -> Iterator[_Piece]:
+) -> Iterator[Piece]:
     """Panes of equal width with a mullion at both ends of each."""
     if length <= 2 * panes.mullion:
         raise ConfigError(f"wall {wall.name!r}: a stretch of {length:.2f} m has no room for a pane")
@@ -114,11 +159,10 @@ def _pane_pieces(
     joints = np.linspace(panes.mullion / 2, length - panes.mullion / 2, count + 1)
     for begin, end in itertools.pairwise(joints):
         span = (begin + panes.mullion / 2, end - panes.mullion / 2)
-        yield _Piece(wall.name, wall.material, _face(origin, direction, span, 0.0), wall.lean_deg)
+        yield _piece(wall, _face(origin, direction, span, 0.0))
     for joint in joints:
-        yield _Piece(
-            f"{wall.name}-mullions", panes.material, _mullion(panes, origin + joint * direction, direction)
-        )
+        outline = _mullion(panes, origin + joint * direction, direction)
+        yield Piece(f"{wall.name}-mullions", panes.material, outline, wall.z_low, wall.z_high)
 
 
 def _mullion(panes: Panes, centre: FloatArray, direction: FloatArray) -> FloatArray:

@@ -25,6 +25,7 @@ _PARAMETERS: Final[dict[str, dict[str, float]]] = {
     "glass": {"reflectance": 0.0, "haze": 1.0, "glint": 1.0, "mirrored": 0.08, "flatness_deg": 0.18},
 }
 """What each kind has besides its reflectance, and the value taken where a scene gives none."""
+_COMMON: Final = frozenset({"kind", "reflectance", "sonar_limit_deg", "sonar_reach"})
 
 
 class Material(Part):
@@ -48,6 +49,10 @@ class Material(Part):
     """Spike of a pane at normal incidence; 1 as measured on the same panes."""
     flatness_deg: NonNegative = 0.0
     """How far single panes lean out of the vertical, standard deviation, deg."""
+    sonar_limit_deg: Positive = 8.0
+    """Largest incidence at which ultrasound comes straight back, deg; small for what is smooth."""
+    sonar_reach: Share = 1.0
+    """Share of the range of a sonar up to which the surface is heard; soft things swallow sound."""
 
     @model_validator(mode="before")
     @classmethod
@@ -58,7 +63,7 @@ class Material(Part):
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> "Material":
-        foreign = self.model_fields_set - {"kind", "reflectance", *_PARAMETERS[self.kind]}
+        foreign = self.model_fields_set - {*_COMMON, *_PARAMETERS[self.kind]}
         if foreign:
             raise ValueError(f"a {self.kind} material has no {sorted(foreign)[0]}")
         return self
@@ -70,12 +75,12 @@ class Material(Part):
 
 MATERIALS: Final = {
     "plaster": Material(reflectance=0.85),
-    "concrete": Material(reflectance=0.45),
-    "brick": Material(reflectance=0.35),
+    "concrete": Material(reflectance=0.45, sonar_limit_deg=15.0),
+    "brick": Material(reflectance=0.35, sonar_limit_deg=35.0),
     "wood": Material(reflectance=0.55),
     "painted_metal": Material(reflectance=0.6),
-    "cardboard": Material(reflectance=0.65),
-    "fabric": Material(reflectance=0.3),
+    "cardboard": Material(reflectance=0.65, sonar_limit_deg=15.0),
+    "fabric": Material(reflectance=0.3, sonar_limit_deg=50.0, sonar_reach=0.5),
     "black_plastic": Material(reflectance=0.08),
     "glossy_paint": Material(kind="glossy", reflectance=0.6, gloss=0.9, gloss_width_deg=6.0),
     "aluminium": Material(kind="glossy", reflectance=0.3, gloss=2.0, gloss_width_deg=14.0),

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from glassslam.records import Record
 from glassslam.simulation.rosbag1 import write_rosbag1
@@ -21,6 +22,8 @@ class WrittenRecording:
         The recording, the true poses (TUM) and the true surfaces (JSON).
     true_labels, true_glass : Path
         What every beam met (npz) and the panes (GeoJSON).
+    true_map, true_image, true_classes : Path
+        The true map (map_server YAML and PGM) and the class of its cells (PNG).
     scans : int
         Number of scans in the bag.
     """
@@ -30,6 +33,9 @@ class WrittenRecording:
     true_plan: Path
     true_labels: Path
     true_glass: Path
+    true_map: Path
+    true_image: Path
+    true_classes: Path
     scans: int
 
 
@@ -59,7 +65,14 @@ def write_recording(
             progress(record.stamp - start)
 
     log = TruthLog(simulation.plan.segments)
-    scans = write_rosbag1(simulation.records(log.add), bag, simulation.scene.laser_pose, report)
+    ring = None if simulation.sonar is None else simulation.sonar.ring
+    scene, mount = simulation.scene, simulation.scene.ultrasonic
+    # Recordings without the sensor know nothing of heights.
+    heights: dict[str, Any] = {}
+    if mount is not None:
+        x, y, yaw = mount.pose
+        heights = {"ultrasonic": (x, y, mount.height, yaw), "laser_height": scene.laser_height}
+    scans = write_rosbag1(simulation.records(log.add), bag, scene.laser_pose, report, ring, **heights)
     for stale in truth_paths(bag):
         stale.unlink(missing_ok=True)
     truth = write_truth(simulation, bag, log)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from glassslam.errors import OutputError
-from glassslam.records import LaserScan, Odometry, Record
+from glassslam.records import FloatArray, LaserScan, Odometry, PointSet, RangeRing, Record, SonarRing
 
 if TYPE_CHECKING:
     from rosbags.rosbag1 import Writer
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 _NS = 1_000_000_000
 _TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
+_RANGE = "sensor_msgs/msg/Range"
+_POINTS = "sensor_msgs/msg/PointCloud2"
+_ULTRASONIC = "ultrasonic"
+_FLOAT32 = 7
 _TOPICS = {
     "/tf_static": ("tf2_msgs/msg/TFMessage", 1),
     "/tf": ("tf2_msgs/msg/TFMessage", 0),
@@ -30,21 +34,33 @@ def write_rosbag1(
     path: str | Path,
     base_from_laser: tuple[float, float, float] = (0.0, 0.0, 0.0),
     progress: Callable[[Record], None] | None = None,
+    ring: SonarRing | None = None,
+    ultrasonic: tuple[float, float, float, float] | None = None,
+    laser_height: float = 0.0,
 ) -> int:
     """Write scans and odometry as `/scan`, `/odom`, `/tf` (odom to base_link) and `/tf_static`.
+
+    Sonars are written as `/sonar_00`, `/sonar_01` ... (sensor_msgs/Range), each in a frame of its own name,
+    points of a 3D ultrasonic sensor as `/ultrasonic` (sensor_msgs/PointCloud2) in the frame `ultrasonic`.
 
     The bag appears under its name only when it is complete.
 
     Parameters
     ----------
     records : iterable of Record
-        In the order of recording; other kinds than scans and odometry are left out.
+        In the order of recording; what the robot has no sensor for is left out.
     path : str or Path
         The bag; an existing one is replaced.
     base_from_laser : tuple of float
         Pose x, y, yaw of the laser on the base, m and rad.
     progress : callable, optional
         Called with each record after it was written.
+    ring : SonarRing, optional
+        The sonars of the robot; without it sonar readings are left out.
+    ultrasonic : tuple of float, optional
+        Pose x, y, z, yaw of a 3D ultrasonic sensor on the base, m and rad; without it points are left out.
+    laser_height : float
+        Height of the laser above the base, m.
 
     Returns
     -------
@@ -64,7 +80,9 @@ def write_rosbag1(
         target.parent.mkdir(parents=True, exist_ok=True)
         partial.unlink(missing_ok=True)
         with Writer(partial) as writer:
-            scans = _write_all(_BagMessages(writer), records, base_from_laser, progress)
+            bag = _BagMessages(writer, ring, ultrasonic)
+            laser = (*base_from_laser, laser_height)
+            scans = _write_all(bag, records, laser, progress)
         with partial.open("rb") as done:
             os.fsync(done.fileno())
         partial.replace(target)
@@ -79,18 +97,22 @@ def write_rosbag1(
 def _write_all(
     bag: "_BagMessages",
     records: Iterable[Record],
-    base_from_laser: tuple[float, float, float],
+    laser: tuple[float, float, float, float],
     progress: Callable[[Record], None] | None,
 ) -> int:
     scans = 0
     for number, record in enumerate(records):
         if number == 0:
-            bag.static_transform(record.stamp, base_from_laser)
+            bag.static_transform(record.stamp, laser)
         if isinstance(record, LaserScan):
             bag.scan(record, scans)
             scans += 1
         elif isinstance(record, Odometry):
             bag.odometry(record)
+        elif isinstance(record, RangeRing):
+            bag.readings(record)
+        elif isinstance(record, PointSet):
+            bag.points(record)
         if progress is not None:
             progress(record)
     return scans
@@ -99,14 +121,24 @@ def _write_all(
 class _BagMessages:
     """Turns records into serialised messages of an open bag."""
 
-    def __init__(self, writer: "Writer") -> None:
+    def __init__(
+        self,
+        writer: "Writer",
+        ring: SonarRing | None = None,
+        ultrasonic: tuple[float, float, float, float] | None = None,
+    ) -> None:
         self._store = _typestore()
         self._writer = writer
+        self._ring, self._ultrasonic = ring, ultrasonic
+        sonars = range(0 if ring is None else len(ring.poses))
+        self._topics = _TOPICS | {f"/{_sonar(number)}": (_RANGE, 0) for number in sonars}
+        if ultrasonic is not None:
+            self._topics[f"/{_ULTRASONIC}"] = (_POINTS, 0)
         self._connections = {
             topic: writer.add_connection(
                 topic, kind, typestore=self._store, callerid="/glassslam", latching=latching
             )
-            for topic, (kind, latching) in _TOPICS.items()
+            for topic, (kind, latching) in self._topics.items()
         }
         self._count = 0
 
@@ -147,22 +179,72 @@ class _BagMessages:
         transform = self._transform(record.stamp, "odom", "base_link", (x, y, theta))
         self._write("/tf", record.record_stamp, transform)
 
-    def static_transform(self, stamp: float, base_from_laser: tuple[float, float, float]) -> None:
-        self._write("/tf_static", stamp, self._transform(stamp, "base_link", "laser", base_from_laser))
+    def readings(self, record: RangeRing) -> None:
+        """One message for each sonar that has fired."""
+        if self._ring is None:
+            return
+        for number in np.flatnonzero(~np.isnan(record.ranges)).tolist():
+            message = self._make(
+                _RANGE,
+                header=self._header(record.stamp, _sonar(number), self._count),
+                radiation_type=0,
+                field_of_view=self._ring.field_of_view,
+                min_range=self._ring.range_min,
+                max_range=self._ring.range_max,
+                range=float(record.ranges[number]),
+            )
+            self._write(f"/{_sonar(number)}", record.record_stamp, message)
+
+    def points(self, record: PointSet) -> None:
+        """The points in the frame of the sensor."""
+        if self._ultrasonic is None:
+            return
+        local = _turned_back(record.points.astype(np.float64) - self._ultrasonic[:3], self._ultrasonic[3])
+        fields = [
+            self._make("sensor_msgs/msg/PointField", name=name, offset=4 * k, datatype=_FLOAT32, count=1)
+            for k, name in enumerate("xyz")
+        ]
+        message = self._make(
+            _POINTS,
+            header=self._header(record.stamp, _ULTRASONIC, self._count),
+            height=1,
+            width=len(local),
+            fields=fields,
+            is_bigendian=False,
+            point_step=12,
+            row_step=12 * len(local),
+            data=np.frombuffer(local.astype("<f4").tobytes(), dtype=np.uint8),
+            is_dense=True,
+        )
+        self._write(f"/{_ULTRASONIC}", record.record_stamp, message)
+
+    def static_transform(self, stamp: float, laser: tuple[float, float, float, float]) -> None:
+        x, y, yaw, height = laser
+        frames = [self._stamped(stamp, "base_link", "laser", (x, y, yaw), height)]
+        for number, (x, y, yaw) in enumerate([] if self._ring is None else self._ring.poses.tolist()):
+            frames.append(self._stamped(stamp, "base_link", _sonar(number), (x, y, yaw)))
+        if self._ultrasonic is not None:
+            x, y, height, yaw = self._ultrasonic
+            frames.append(self._stamped(stamp, "base_link", _ULTRASONIC, (x, y, yaw), height))
+        self._write("/tf_static", stamp, self._make("tf2_msgs/msg/TFMessage", transforms=frames))
 
     def _transform(self, stamp: float, parent: str, child: str, pose: tuple[float, float, float]) -> Any:
+        return self._make("tf2_msgs/msg/TFMessage", transforms=[self._stamped(stamp, parent, child, pose)])
+
+    def _stamped(
+        self, stamp: float, parent: str, child: str, pose: tuple[float, float, float], height: float = 0.0
+    ) -> Any:
         transform = self._make(
             "geometry_msgs/msg/Transform",
-            translation=self._vector(pose[0], pose[1]),
+            translation=self._vector(pose[0], pose[1], height),
             rotation=self._yaw(pose[2]),
         )
-        stamped = self._make(
+        return self._make(
             "geometry_msgs/msg/TransformStamped",
             header=self._header(stamp, parent, 0),
             child_frame_id=child,
             transform=transform,
         )
-        return self._make("tf2_msgs/msg/TFMessage", transforms=[stamped])
 
     def _header(self, stamp: float, frame: str, number: int) -> Any:
         seconds, nanoseconds = divmod(_nanoseconds(stamp), _NS)
@@ -173,8 +255,8 @@ class _BagMessages:
         z, w = float(np.sin(theta / 2)), float(np.cos(theta / 2))
         return self._make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=z, w=w)
 
-    def _vector(self, x: float, y: float) -> Any:
-        return self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=0.0)
+    def _vector(self, x: float, y: float, z: float = 0.0) -> Any:
+        return self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
     def _point(self, x: float, y: float) -> Any:
         return self._make("geometry_msgs/msg/Point", x=x, y=y, z=0.0)
@@ -183,7 +265,7 @@ class _BagMessages:
         return self._store.types[kind](**fields)
 
     def _write(self, topic: str, stamp: float, message: Any) -> None:
-        data = self._store.serialize_ros1(message, _TOPICS[topic][0])
+        data = self._store.serialize_ros1(message, self._topics[topic][0])
         self._writer.write(self._connections[topic], _nanoseconds(stamp), data)
 
 
@@ -194,6 +276,18 @@ def _typestore() -> "Typestore":
     store = get_typestore(Stores.ROS1_NOETIC)
     store.register(get_types_from_msg(_TF_DEFINITION, "tf2_msgs/msg/TFMessage"))
     return store
+
+
+def _turned_back(points: FloatArray, yaw: float) -> FloatArray:
+    """Points (n, 3) in a frame turned by a yaw, rad."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    x, y = points[:, 0], points[:, 1]
+    return np.stack((cosine * x + sine * y, cosine * y - sine * x, points[:, 2]), axis=1)
+
+
+def _sonar(number: int) -> str:
+    """Name of the frame of a sonar, and of its topic."""
+    return f"sonar_{number:02d}"
 
 
 def _nanoseconds(stamp: float) -> int:

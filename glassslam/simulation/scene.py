@@ -34,7 +34,22 @@ class Panes(Part):
     material: str = "aluminium"
 
 
-class Wall(Part):
+class Solid(Part):
+    """Anything that stands or hangs between two heights."""
+
+    z_low: NonNegative = 0.0
+    """Height of its underside above the floor, m."""
+    z_high: Positive = 2.5
+    """Height of its top, m."""
+
+    @model_validator(mode="after")
+    def _has_height(self) -> Self:
+        if self.z_low >= self.z_high:
+            raise ValueError(f"z_low {self.z_low:g} is not below z_high {self.z_high:g}")
+        return self
+
+
+class Wall(Solid):
     """A line of wall or of panes: open through `points`, closed when `closed`."""
 
     name: str
@@ -56,8 +71,8 @@ class Wall(Part):
         return self
 
 
-class Box(Part):
-    """Rectangular things standing on the floor."""
+class Box(Solid):
+    """Rectangular things: on the floor, or table tops above it."""
 
     name: str
     material: str
@@ -68,8 +83,8 @@ class Box(Part):
     yaw_deg: Finite = 0.0
 
 
-class Post(Part):
-    """Round things standing on the floor: columns, legs, bins."""
+class Post(Solid):
+    """Round things: columns, legs, bins, hanging lamps."""
 
     name: str
     material: str
@@ -142,6 +157,17 @@ class OdometryModel(Part):
     """Sideways error after 1 rad of turning, m."""
 
 
+class UltrasonicMount(Part):
+    """A 3D ultrasonic sensor on the robot; without one a recording has no points."""
+
+    pose: tuple[Finite, Finite, Finite] = (0.15, 0.0, 0.0)
+    """Pose on the robot base: x m, y m, yaw rad; it hears around its x axis."""
+    height: Positive = 0.4
+    """Height above the floor, m."""
+    rate: Positive = 20.0
+    """Pings per second."""
+
+
 class Scene(Part):
     """A world to simulate: everything but the lidar's own figures."""
 
@@ -151,6 +177,14 @@ class Scene(Part):
     """Lidar carried unless another is asked for."""
     laser_pose: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Pose of the laser on the robot base: x m, y m, yaw rad."""
+    laser_height: NonNegative = 0.2
+    """Height of its plane above the floor, m: what does not reach it is not seen."""
+    robot_height: Positive = 0.6
+    """The robot passes below what begins higher than this, m."""
+    ceiling: Positive | None = 2.5
+    """Height of the ceiling, m; it is only heard."""
+    ultrasonic: UltrasonicMount | None = None
+    """A 3D ultrasonic sensor carried as well."""
     scan_rate: Positive | None = None
     """Scans recorded per second, at most those of the lidar; all when omitted."""
     start_time: NonNegative = 1_500_000_000.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from glassslam.errors import ConfigError, UsageError
 from glassslam.geometry import compose, wrap_angle
-from glassslam.records import Float32Array, FloatArray, LaserScan, Record, Trajectory
+from glassslam.records import Float32Array, FloatArray, LaserScan, PointSet, RangeRing, Record, Trajectory
 from glassslam.simulation.drive import Motion, drive_path
 from glassslam.simulation.echo import Observation, Optics
 from glassslam.simulation.floorplan import FloorPlan, build_floor_plan
@@ -17,6 +17,9 @@ from glassslam.simulation.people import Crowd, feet
 from glassslam.simulation.raycast import clearance
 from glassslam.simulation.scene import Scene
 from glassslam.simulation.sensors import LidarModel, lidar
+from glassslam.simulation.sonar import SonarArray, sonar_records
+from glassslam.simulation.sonar_models import SonarModel, sonar_model
+from glassslam.simulation.ultrasonic import Ear, ultrasonic_records
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,8 @@ class Simulation:
         Every surface, for the truth and for drawing.
     truth : Trajectory
         True pose of the base at the stamp of every scan, world frame.
+    sonar : SonarModel or None
+        The ring of sonars; None when the robot has none.
     """
 
     scene: Scene
@@ -45,6 +50,7 @@ class Simulation:
     motion: Motion
     plan: FloorPlan
     truth: Trajectory
+    sonar: SonarModel | None = None
 
     @property
     def driven(self) -> float:
@@ -52,7 +58,7 @@ class Simulation:
         return float(np.hypot(*np.diff(self.motion.poses[:, :2], axis=0).T).sum())
 
     def records(self, watch: Callable[[Observation], None] | None = None) -> Iterator[Record]:
-        """Scans and odometry in the order in which they would be recorded.
+        """Scans, odometry, sonar readings and ultrasonic points in the order in which they would be recorded.
 
         Parameters
         ----------
@@ -61,7 +67,22 @@ class Simulation:
         """
         scene = self.scene
         odometry = odometry_records(self.motion, scene.odometry, self.seed, scene.start_time)
-        return heapq.merge(odometry, self._scans(watch), key=lambda record: record.record_stamp)
+        streams: list[Iterator[Record]] = [odometry, self._scans(watch), self._readings(), self._points()]
+        return heapq.merge(*streams, key=lambda record: record.record_stamp)
+
+    def _readings(self) -> Iterator[RangeRing]:
+        if self.sonar is None:
+            return iter(())
+        scene = self.scene
+        array = SonarArray.build(self.plan, scene.palette(), self.sonar)
+        return sonar_records(array, self.motion, Crowd.of(scene), self.seed, scene.start_time)
+
+    def _points(self) -> Iterator[PointSet]:
+        mount = self.scene.ultrasonic
+        if mount is None:
+            return iter(())
+        ear = Ear.build(self.scene, mount)
+        return ultrasonic_records(ear, self.motion, self.seed, self.scene.start_time)
 
     def _scans(self, watch: Callable[[Observation], None] | None) -> Iterator[LaserScan]:
         sensor, random = self.sensor, np.random.default_rng([self.seed, 0])
@@ -94,7 +115,11 @@ class Simulation:
 
 
 def simulate(
-    scene: Scene, sensor: str | LidarModel | None = None, seed: int = 0, scan_rate: float | None = None
+    scene: Scene,
+    sensor: str | LidarModel | None = None,
+    seed: int = 0,
+    scan_rate: float | None = None,
+    sonar: str | SonarModel | None = None,
 ) -> Simulation:
     """Drive the robot of a scene and prepare its recording.
 
@@ -108,21 +133,52 @@ def simulate(
         Seed of all noise.
     scan_rate : float, optional
         Scans recorded per second; the scene's own, or all of the lidar, when omitted.
+    sonar : str or SonarModel, optional
+        The ring of sonars or its name; no sonars when omitted.
 
     Raises
     ------
     UsageError
-        There is no such lidar, or it does not turn that fast.
+        There is no such lidar or ring, or the lidar does not turn that fast.
     ConfigError
         The floor plan is contradictory, or the robot would run into something.
     """
+    motion = drive_path(scene.drive)
+    simulation = simulate_along(scene, motion, sensor, seed, scan_rate, sonar)
+    _check_clear(scene, build_floor_plan(scene, (0.0, scene.robot_height)), motion)
+    _check_people(scene, motion)
+    return simulation
+
+
+def simulate_along(
+    scene: Scene,
+    motion: Motion,
+    sensor: str | LidarModel | None = None,
+    seed: int = 0,
+    scan_rate: float | None = None,
+    sonar: str | SonarModel | None = None,
+) -> Simulation:
+    """Prepare the recording of a robot that moves in a given way, wherever that leads it.
+
+    Parameters
+    ----------
+    motion : Motion
+        The true motion of the base, as another robot may have driven; the drive of the scene is not used.
+    scene, sensor, seed, scan_rate, sonar
+        As for `simulate`.
+
+    Raises
+    ------
+    UsageError
+        There is no such lidar or ring, or the lidar does not turn that fast.
+    ConfigError
+        The floor plan is contradictory.
+    """
     model = sensor if isinstance(sensor, LidarModel) else lidar(sensor or scene.sensor)
     model = _thinned(model, scan_rate, scene.scan_rate)
+    ring = sonar_model(sonar) if isinstance(sonar, str) else sonar
     plan = build_floor_plan(scene)
-    motion = drive_path(scene.drive)
-    _check_clear(scene, plan, motion)
-    _check_people(scene, motion)
-    return Simulation(scene, model, seed, motion, plan, _truth(scene, model, motion))
+    return Simulation(scene, model, seed, motion, plan, _truth(scene, model, motion), ring)
 
 
 def _thinned(model: LidarModel, asked: float | None, of_scene: float | None) -> LidarModel:

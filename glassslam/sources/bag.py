@@ -1,7 +1,7 @@
 """What every bag format offers, and how one is opened."""
 
 from collections.abc import Callable, Collection, Generator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -16,7 +16,13 @@ MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
 IMU = "sensor_msgs/msg/Imu"
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+RANGE = "sensor_msgs/msg/Range"
+CLOUD = "sensor_msgs/msg/PointCloud"
+CLOUD2 = "sensor_msgs/msg/PointCloud2"
+RANGE_ARRAY = "std_msgs/msg/Float32MultiArray"
+TS_SCAN = "toposens_msgs/msg/TsScan"
 SCAN_TYPES = (LASER_SCAN, MULTI_ECHO)
+SONAR_TYPES = (RANGE, CLOUD, CLOUD2, RANGE_ARRAY, TS_SCAN)
 USED_TYPES = (*SCAN_TYPES, ODOMETRY, IMU, *TF_TYPES)
 
 _TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
@@ -95,6 +101,25 @@ def merge_topics(topics: Collection[Topic]) -> tuple[Topic, ...]:
 
 def typestore_for(connections: Collection["Connection"], format_name: Format) -> "Typestore":
     """Message definitions as recorded, the common ones where a bag holds none."""
+    store = _store_of_used_types(connections, format_name)
+    _add_sonar_types(store, connections)
+    return store
+
+
+def _add_sonar_types(store: "Typestore", connections: Collection["Connection"]) -> None:
+    """Add what sonars need; a definition that does not fit costs its topic and no other."""
+    from rosbags.interfaces import MessageDefinitionFormat  # noqa: PLC0415
+    from rosbags.typesys import TypesysError, get_types_from_msg  # noqa: PLC0415
+
+    for connection in connections:
+        definition = connection.msgdef
+        wanted = connection.msgtype in SONAR_TYPES and connection.msgtype not in store.fielddefs
+        if wanted and definition.format is MessageDefinitionFormat.MSG:
+            with suppress(TypesysError):
+                store.register(get_types_from_msg(definition.data, connection.msgtype))
+
+
+def _store_of_used_types(connections: Collection["Connection"], format_name: Format) -> "Typestore":
     from rosbags.interfaces import MessageDefinitionFormat  # noqa: PLC0415
     from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore  # noqa: PLC0415
 

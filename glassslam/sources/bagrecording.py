@@ -6,12 +6,13 @@ from typing import Any
 
 from glassslam.records import LaserScan, Record, RecordingInfo
 from glassslam.sources import messages
-from glassslam.sources.bag import MULTI_ECHO, Bag, Topic, open_bag
+from glassslam.sources.bag import MULTI_ECHO, RANGE, Bag, Topic, open_bag
 from glassslam.sources.bagsurvey import Survey, scan_decoder, survey
 from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
 from glassslam.sources.options import SourceOptions
 from glassslam.sources.recording import Recording
+from glassslam.sources.sonarfeed import ReadSonar, SonarFeed
 from glassslam.sources.transforms import Edge, frame_name
 
 Handler = Callable[[bytes, int], Iterator[Record]]
@@ -34,7 +35,8 @@ class BagRecording(Recording):
     """A recording in ROS bags; see `Recording`."""
 
     def __init__(self, bags: Sequence[Bag], found: Survey, options: SourceOptions) -> None:
-        super().__init__(_info(bags, found, options), found.warnings)
+        span = found.start / 1e9, (found.stop - 1) / 1e9
+        super().__init__(_info(bags, found, options), found.warnings, span, found.sonar.rule)
         self._bags = bags
         self._found = found
         self._options = options
@@ -42,12 +44,19 @@ class BagRecording(Recording):
 
     def _stream(self) -> Iterator[Record]:
         self._scans_seen = 0
+        sonar = SonarFeed(self._found.sonar)
         for bag in self._bags:
-            yield from self._stream_bag(bag)
+            yield from self._stream_bag(bag, sonar)
+        yield from sonar.flush()
 
-    def _stream_bag(self, bag: Bag) -> Iterator[Record]:
+    def _stream_bag(self, bag: Bag, sonar: SonarFeed) -> Iterator[Record]:
         handlers = {topic: self._handler(bag, topic) for topic in bag.topics if self._uses(topic)}
+        for topic in bag.topics:
+            if topic.count > 0 and self._found.sonar.uses(topic):
+                handlers[topic] = partial(_all, bag.decoder(topic.msgtype), sonar.reader(topic))
         for topic, time, raw in bag.messages(list(handlers), self._found.start, self._found.stop):
+            if topic.msgtype != RANGE:
+                yield from sonar.flush()
             try:
                 yield from handlers[topic](raw, time)
             except UnusableMessageError as error:
@@ -119,6 +128,10 @@ def _one(decode: Callable[[bytes], Any], convert: Convert, raw: bytes, time: int
     yield _convert(decode, convert, raw, time)
 
 
+def _all(decode: Callable[[bytes], Any], read: ReadSonar, raw: bytes, time: int) -> Iterator[Record]:
+    yield from _convert(decode, read, raw, time)
+
+
 def _convert(decode: Callable[[bytes], Any], convert: Convert, raw: bytes, time: int) -> Any:
     """A decoded and converted message; every failure makes it an unusable one."""
     try:
@@ -141,4 +154,6 @@ def _info(bags: Sequence[Bag], found: Survey, options: SourceOptions) -> Recordi
         odom_topic=found.odom_name,
         imu_topic=imu.name if imu else "",
         no_echo=found.no_echo.value,
+        sonar_ring=found.sonar.ring,
+        sonar_topics=found.sonar.names,
     )

@@ -13,12 +13,14 @@ import numpy as np
 from glassslam.errors import UsageError
 from glassslam.records import FloatArray
 from glassslam.sources.bag import MULTI_ECHO, Bag, Topic, merge_topics
+from glassslam.sources.bagsonar import plan_sonar
 from glassslam.sources.failures import reading
 from glassslam.sources.frames import edge_name, guess_base, odometry_edge, read_tree
 from glassslam.sources.messages import Mount
 from glassslam.sources.multiecho import EchoScan, parse_cdr, parse_ros1
 from glassslam.sources.noecho import NoEcho, detect_no_echo
 from glassslam.sources.options import Echo, SourceOptions
+from glassslam.sources.sonarfeed import SonarPlan
 from glassslam.sources.topics import Choice, choose_topics
 from glassslam.sources.transforms import (
     Edge,
@@ -62,6 +64,8 @@ class Survey:
         Record times of the part in use, ns; `stop` is exclusive.
     share : float
         Part of the recording in use, 0 to 1.
+    sonar : SonarPlan
+        How sonars are read.
     warnings : tuple of str
         What a user should know.
     """
@@ -75,6 +79,7 @@ class Survey:
     start: int
     stop: int
     share: float
+    sonar: SonarPlan
     warnings: tuple[str, ...]
 
     @property
@@ -132,6 +137,7 @@ class _Surveyor:
         matrix = self._base_from_laser(tree, base, laser)
         no_echo = detect_no_echo(self._sample_ranges(choice.scan))
         base_from_imu = tree.lookup(base, imu) if imu else None
+        sonar = plan_sonar(self._bags, topics, choice.transforms, base, self._options)
         return Survey(
             choice=choice,
             edge=edge,
@@ -142,7 +148,8 @@ class _Surveyor:
             start=start,
             stop=stop,
             share=min(1.0, (stop - start) / (end + 1 - begin)),
-            warnings=tuple(self._warnings),
+            sonar=sonar,
+            warnings=(*self._warnings, *sonar.warnings),
         )
 
     def _check_order(self) -> None:

@@ -23,6 +23,8 @@ def open_carmen(pieces: Sequence[Piece], options: SourceOptions) -> "CarmenRecor
     """
     if options.imu_topic not in {None, "none"}:
         raise UsageError(f"imu topic {options.imu_topic} is not in the log; a CARMEN log has no IMU")
+    if (options.sonar_topics or options.sonar_ring is not None) and not options.without_sonar:
+        raise UsageError("a CARMEN log holds no sonar", "--sonar names a second file that does")
     return CarmenRecording(pieces, survey(pieces, options), options)
 
 

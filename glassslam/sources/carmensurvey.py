@@ -1,11 +1,9 @@
 """What must be known of a CARMEN log before its records can be streamed."""
 
-import gzip
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import IO, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,11 +20,11 @@ from glassslam.sources.carmenlines import (
     parse_laser,
     parse_odom,
 )
-from glassslam.sources.failures import reading
-from glassslam.sources.formats import GZIP_MAGIC, Piece
+from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
 from glassslam.sources.noecho import NoEcho, detect_no_echo
 from glassslam.sources.options import UNUSED, SourceOptions
+from glassslam.sources.textlines import text_lines
 from glassslam.sources.topics import pick_topic
 
 _T = TypeVar("_T")
@@ -47,20 +45,13 @@ def carmen_lines(piece: Piece) -> Iterator[tuple[str, bytes]]:
     RecordingError
         The file cannot be read or unpacked to its end.
     """
-    with reading(piece.path, piece.format), _open(piece.path) as file:
-        for line in file:
-            for tag, prefix in _PREFIXES.items():
-                if line.startswith(prefix):
-                    yield tag, line
-                    break
-            else:
-                yield "", line
-
-
-def _open(path: Path) -> IO[bytes]:
-    with path.open("rb") as file:
-        packed = file.read(2) == GZIP_MAGIC
-    return gzip.open(path, "rb") if packed else path.open("rb")  # type: ignore[return-value]
+    for line in text_lines(piece):
+        for tag, prefix in _PREFIXES.items():
+            if line.startswith(prefix):
+                yield tag, line
+                break
+        else:
+            yield "", line
 
 
 @dataclass(slots=True)

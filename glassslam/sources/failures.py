@@ -11,6 +11,7 @@ REPAIR_TOOLS = {
     "rosbag1": "'rosbag reindex' for a ROS1 bag",
     "rosbag2-mcap": "'mcap recover' for an mcap file",
     "rosbag2-sqlite3": "'sqlite3 FILE .recover' for a db3 file",
+    "player": "'gzip -t' tells whether a compressed log is complete",
     "carmen": "'gzip -t' tells whether a compressed log is complete",
 }
 

@@ -10,10 +10,10 @@ from typing import Literal, TypeAlias
 from glassslam.errors import RecordingError
 from glassslam.sources.failures import reading
 
-Format: TypeAlias = Literal["rosbag1", "rosbag2-sqlite3", "rosbag2-mcap", "carmen"]
+Format: TypeAlias = Literal["rosbag1", "rosbag2-sqlite3", "rosbag2-mcap", "carmen", "player", "pimap"]
 
 GZIP_MAGIC = b"\x1f\x8b"
-KNOWN = "glassslam reads ROS1 bags, ROS2 bags (sqlite3, mcap; file or directory) and CARMEN logs"
+KNOWN = "glassslam reads ROS1 bags, ROS2 bags (sqlite3, mcap; file or directory), CARMEN and Player logs"
 
 _MAGIC: tuple[tuple[bytes, Format], ...] = (
     (b"#ROSBAG V2.0", "rosbag1"),
@@ -31,6 +31,12 @@ _REFUSED: tuple[tuple[bytes, str, str], ...] = (
     (b"PK\x03\x04", "a zip archive", "unpack it"),
 )
 _CARMEN_LINE = re.compile(rb"^(?:FLASER|RLASER|ROBOTLASER\d|RAWLASER\d|ODOM|PARAM|SYNC)\s", re.MULTILINE)
+_PLAYER_LINE = re.compile(
+    rb"^## Player version|^\d+\.\d+ \S+ \d+ (?:laser|sonar|ranger|position|position2d) +\d+ [\d.]+ ",
+    re.MULTILINE,
+)
+# Index, counter, counter, ticks of 100 ns since the year 1, then readings.
+_PIMAP_LINE = re.compile(rb"\d+ \d+ \d+ 6\d{17}(?: -?[\d.]+){3,}\s*$", re.MULTILINE)
 _HEAD_BYTES = 1 << 16
 
 
@@ -104,8 +110,13 @@ def _detect(path: Path) -> Format:
         if head.startswith(magic):
             raise RecordingError(f"{path} is {what}", hint)
     text = _inflate(head) if head.startswith(GZIP_MAGIC) else head
-    if b"\x00" not in text and _CARMEN_LINE.search(text):
-        return "carmen"
+    if b"\x00" not in text:
+        if _CARMEN_LINE.search(text):
+            return "carmen"
+        if _PLAYER_LINE.search(text):
+            return "player"
+        if _PIMAP_LINE.match(text):
+            return "pimap"
     raise RecordingError(f"{path} is no recording known here", KNOWN)
 
 

@@ -11,7 +11,8 @@ from glassslam.geometry import wrap_angle
 from glassslam.records import Float32Array, Imu, LaserScan, Odometry
 from glassslam.sources.messages import upper_limit
 from glassslam.sources.noecho import detect_no_echo
-from glassslam.sources.report import ImuReport, IntensityReport, OdometryReport, ScanReport, Span, StampReport
+from glassslam.sources.report import ImuReport, IntensityReport, OdometryReport, ScanReport, Span
+from glassslam.sources.sonarreport import StampReport
 
 _R = TypeVar("_R")
 

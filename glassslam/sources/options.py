@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 from glassslam.errors import UsageError
@@ -31,6 +32,12 @@ class SourceOptions:
     echo : {"first", "last", "strongest"}
         Which echo of a MultiEchoLaserScan becomes the range. The first is the nearest surface, as a
         single-echo lidar reports it.
+    sonar : str, Path or None
+        A second file, which holds the sonar readings: a bag, a Player log or a pi-map text log.
+    sonar_topic : str, tuple of str or None
+        Topics of the sonars by name; None: what looks like sonar. "none" switches sonar off.
+    sonar_ring : str, Path or None
+        Where the sonars sit: the name of a shipped ring or a YAML file; None: as recorded.
 
     Raises
     ------
@@ -46,6 +53,9 @@ class SourceOptions:
     duration: float | None = None
     every: int = 1
     echo: Echo = "first"
+    sonar: str | Path | None = None
+    sonar_topic: str | tuple[str, ...] | None = None
+    sonar_ring: str | Path | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.start) and self.start >= 0):
@@ -60,6 +70,19 @@ class SourceOptions:
             raise UsageError(f"laser pose must be three finite numbers x,y,yaw, not {self.laser_pose}")
         if self.scan_topic == UNUSED:
             raise UsageError("a map needs scans: the scan topic cannot be 'none'")
+        if self.without_sonar and self.sonar is not None:
+            raise UsageError("a sonar file was named and sonar switched off", "leave out one of the two")
+
+    @property
+    def sonar_topics(self) -> tuple[str, ...]:
+        """The topics of `sonar_topic`, however they were given."""
+        wish = self.sonar_topic
+        return () if wish is None else (wish,) if isinstance(wish, str) else tuple(wish)
+
+    @property
+    def without_sonar(self) -> bool:
+        """Whether sonar is switched off."""
+        return UNUSED in self.sonar_topics
 
 
 def _is_pose(values: tuple[float, ...]) -> bool:

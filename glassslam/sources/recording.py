@@ -1,13 +1,16 @@
 """A recording: what is known of it, and the stream of its records."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from glassslam.errors import NoScansError
 from glassslam.records import LaserScan, Record, RecordingInfo
-from glassslam.sources.formats import resolve
-from glassslam.sources.options import SourceOptions
+from glassslam.sources.formats import Piece, resolve
+from glassslam.sources.options import UNUSED, SourceOptions
+from glassslam.sources.sweeps import SweepRule
 
 
 class Recording(ABC):
@@ -21,10 +24,22 @@ class Recording(ABC):
         Reason -> number of messages that could not become records; filled while iterating.
     warnings : list of str
         What a user should know, one line each; grows while iterating.
+    span : tuple of float
+        Record times of the beginning and the end of the part in use, s.
+    sonar_rule : SweepRule or None
+        How the ranges of the ring of sonars are read; None without a ring.
     """
 
-    def __init__(self, info: RecordingInfo, warnings: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        info: RecordingInfo,
+        warnings: Sequence[str] = (),
+        span: tuple[float, float] = (-math.inf, math.inf),
+        sonar_rule: SweepRule | None = None,
+    ) -> None:
         self.info = info
+        self.span = span
+        self.sonar_rule = sonar_rule
         self.dropped: dict[str, int] = {}
         self.warnings: list[str] = list(warnings)
 
@@ -33,7 +48,7 @@ class Recording(ABC):
 
         Yields
         ------
-        LaserScan, Odometry or Imu
+        LaserScan, Odometry, Imu, RangeRing or PointSet
             Never sorted by header stamps: what was recorded first comes first.
 
         Raises
@@ -75,9 +90,9 @@ def open_recording(
     Parameters
     ----------
     paths : path or sequence of paths
-        ROS1 bags, ROS2 bags (file or directory) or CARMEN logs, told by their content.
+        ROS1 bags, ROS2 bags (file or directory), CARMEN or Player logs, told by their content.
     options : SourceOptions, optional
-        Topics, part and echo to use.
+        Topics, part and echo to use; a second file with sonar readings.
 
     Raises
     ------
@@ -91,10 +106,28 @@ def open_recording(
     named = [paths] if isinstance(paths, str | Path) else list(paths)
     pieces = resolve(named)
     chosen = SourceOptions() if options is None else options
+    if chosen.sonar is None:
+        return _open(pieces, chosen)
+    from glassslam.sources.sonarfile import with_sonar  # noqa: PLC0415  (it builds on this module)
+
+    # What the user says of sonar is then said of the second file.
+    alone = replace(chosen, sonar=None, sonar_topic=UNUSED, sonar_ring=None)
+    return with_sonar(_open(pieces, alone), chosen)
+
+
+def _open(pieces: Sequence[Piece], options: SourceOptions) -> Recording:
+    if pieces[0].format == "pimap":
+        raise NoScansError(
+            f"{pieces[0].path} holds no laser scans", "name the recording, and this file with --sonar"
+        )
     if pieces[0].format == "carmen":
         from glassslam.sources.carmen import open_carmen  # noqa: PLC0415  (loads kernels)
 
-        return open_carmen(pieces, chosen)
+        return open_carmen(pieces, options)
+    if pieces[0].format == "player":
+        from glassslam.sources.player import open_player  # noqa: PLC0415  (loads kernels)
+
+        return open_player(pieces, options)
     from glassslam.sources.bagrecording import open_bags  # noqa: PLC0415  (loads rosbags)
 
-    return open_bags(pieces, chosen)
+    return open_bags(pieces, options)

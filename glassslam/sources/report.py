@@ -4,6 +4,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from glassslam.sources.sonarreport import SonarReport, StampReport
 from glassslam.sources.transforms import Pose2
 
 Span = tuple[float, float]
@@ -17,40 +18,6 @@ class TopicReport:
     msgtype: str
     count: int
     rate: float
-
-
-@dataclass(frozen=True, slots=True)
-class StampReport:
-    """The header stamps of a topic, in the order of the recording.
-
-    Attributes
-    ----------
-    count : int
-        Readable messages.
-    period : float
-        Median time between two, s.
-    backward, equal : int
-        Stamps that step back, and that repeat the one before.
-    largest_step_back : float
-        The longest of these steps, s.
-    gaps : int
-        Intervals above three times the median and the mean.
-    longest_gap : float
-        The longest interval, s.
-    offset, offset_min, offset_max : float
-        Record time minus header stamp, median and extremes, s.
-    """
-
-    count: int
-    period: float
-    backward: int
-    equal: int
-    largest_step_back: float
-    gaps: int
-    longest_gap: float
-    offset: float
-    offset_min: float
-    offset_max: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +132,8 @@ class Plan:
     odom_topic: str = ""
     imu_topic: str = ""
     base_from_laser: Pose2 = (0.0, 0.0, 0.0)
+    sonar_topics: tuple[str, ...] = ()
+    sonar_ring: str = ""
     problem: str = ""
     hint: str = ""
 
@@ -191,6 +160,8 @@ class RecordingReport:
         Reason -> number of messages that cannot be used.
     warnings : tuple of str
         What a user should know.
+    sonars : tuple of SonarReport
+        The ring and the 3D sensors.
     """
 
     paths: tuple[str, ...]
@@ -206,6 +177,7 @@ class RecordingReport:
     plan: Plan
     dropped: dict[str, int]
     warnings: tuple[str, ...]
+    sonars: tuple[SonarReport, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; infinite and undefined numbers become the strings "inf", "-inf" and "nan"."""

@@ -15,7 +15,7 @@ from rosbags.rosbag1 import Reader
 from rosbags.rosbag1.reader import Chunk
 
 from glassslam.errors import RecordingError
-from glassslam.sources.bag import USED_TYPES, Decoder, Raw, Topic, merge_topics, typestore_for
+from glassslam.sources.bag import SONAR_TYPES, USED_TYPES, Decoder, Raw, Topic, merge_topics, typestore_for
 from glassslam.sources.failures import reading
 from glassslam.sources.formats import Piece
 
@@ -44,7 +44,7 @@ class Ros1Bag:
             self._store = typestore_for(reader.connections, "rosbag1")
             self._index: dict[tuple[str, str], NDArray[np.int64]] = {}
             for topic in self.topics:
-                if topic.msgtype in USED_TYPES:
+                if topic.msgtype in (*USED_TYPES, *SONAR_TYPES):
                     self._index[topic.name, topic.msgtype] = _file_order(reader, topic)
 
     def decoder(self, msgtype: str) -> Decoder:

@@ -48,6 +48,17 @@ def test_options_reach_the_source_and_the_configuration(calls, tmp_path):
     assert (options.start, options.duration, options.every, options.echo) == (1.0, 2.0, 3, "last")
 
 
+def test_sonar_options_reach_the_source(calls, tmp_path):
+    words = "--sonar ring.txt --sonar-topic /a --sonar-topic /b --sonar-ring pioneer-3dx"
+    assert main(["map", "a.bag", "-o", str(tmp_path / "out"), *words.split()]) == 0
+    ((_, _, options, _),) = calls
+    assert (options.sonar.name, options.sonar_topic, options.sonar_ring) == (
+        "ring.txt",
+        ("/a", "/b"),
+        "pioneer-3dx",
+    )
+
+
 def test_without_a_directory_results_are_named_after_the_recording(calls, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["map", "some/run.bag", "--quiet"]) == 0

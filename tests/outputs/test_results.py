@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from glassslam.errors import OutputError, UsageError
 from glassslam.outputs import (
     RESULT_FILES,
     Stopwatch,
+    build_report,
     check_directory,
     read_g2o,
     read_map,
@@ -22,6 +24,7 @@ from glassslam.outputs import (
     staged_directory,
     write_results,
 )
+from glassslam.records import SonarRing
 
 
 def names(folder):
@@ -69,6 +72,14 @@ def test_numbers_that_json_does_not_know_become_null(tiny_result, tmp_path):
     write_results(tiny_result, tmp_path / "run")
     report = json.loads((tmp_path / "run/report.json").read_text())
     assert report["residuals"] == {"loop_translation_rms": 0.01, "mean": None, "count": 2.0}
+
+
+def test_the_ring_of_sonars_becomes_plain_numbers(tiny_result):
+    ring = SonarRing(np.array([[0.1, 0.2, 1.5], [0.1, -0.2, -1.5]]), 0.5, 0.1, 5.0, "mine")
+    info = replace(tiny_result.info, sonar_ring=ring, sonar_topics=("/sonar",))
+    source = json.loads(json.dumps(build_report(replace(tiny_result, info=info))["source"], allow_nan=False))
+    assert source["sonar_ring"]["poses"] == [[0.1, 0.2, 1.5], [0.1, -0.2, -1.5]]
+    assert (source["sonar_ring"]["name"], source["sonar_topics"]) == ("mine", ["/sonar"])
 
 
 def test_same_run_same_bytes(tiny_result, tmp_path):

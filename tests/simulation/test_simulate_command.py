@@ -27,7 +27,10 @@ def test_simulate_writes_the_bag_and_the_truth_and_says_so(room, tmp_path, capsy
     assert "scans of a rplidar, 2.0 m in" in out
     for name in (
         "room.bag",
-        *(f"room.bag.truth.{end}" for end in ("tum", "json", "labels.npz", "glass.geojson")),
+        *(
+            f"room.bag.truth.{end}"
+            for end in ("tum", "json", "labels.npz", "glass.geojson", "map.yaml", "map.pgm")
+        ),
     ):
         assert f"wrote {tmp_path / 'out' / name}" in out
         assert (tmp_path / "out" / name).is_file()

@@ -7,8 +7,9 @@ from tiny_scene import SQUARE, scene
 
 from detectors.labels import GHOST, GLASS, NAMES, NO_RETURN, SOLID
 from glassslam.errors import OutputError
-from glassslam.geometry import transform_points
-from glassslam.outputs import read_tum
+from glassslam.geometry import inverse, transform_points
+from glassslam.outputs import read_map, read_tum
+from glassslam.outputs.labels import read_labels
 from glassslam.simulation import TruthLog, simulate, truth_paths, write_recording, write_truth
 
 GLASS_ROOM = {
@@ -55,6 +56,9 @@ def test_the_files_of_truth_are_named_after_the_bag(written):
         "room.bag.truth.json",
         "room.bag.truth.labels.npz",
         "room.bag.truth.glass.geojson",
+        "room.bag.truth.map.yaml",
+        "room.bag.truth.map.pgm",
+        "room.bag.truth.map.labels.png",
     ]
     assert all(path.is_file() for path in truth_paths(written.bag))
 
@@ -123,6 +127,24 @@ def test_a_rate_thins_the_scans_but_not_the_sweep(simulation):
     assert np.diff(stamps) == pytest.approx(np.full(stamps.size - 1, 0.125), abs=2e-6)
     scan = next(record for record in simulation.records() if hasattr(record, "ranges"))
     assert scan.time_increment == pytest.approx(0.025 / 1440)
+
+
+def test_the_true_map_lies_in_the_frame_of_the_first_pose(simulation, written):
+    grid = read_map(written.true_map)
+    places = transform_points(
+        inverse(simulation.truth.poses[0]), np.array([[2.5, 3.5], [6.0, 3.0], [3.0, 6.4]])
+    )
+    columns, rows = np.floor((places - grid.origin) / grid.resolution).astype(int).T
+    assert grid.probability[rows[0], columns[0]] == 0.0
+    assert (grid.probability[rows[1], columns[1] - 1 : columns[1] + 2] == 1.0).any()
+    assert np.isnan(grid.probability[rows[2], columns[2]])
+
+
+def test_the_classes_of_the_true_map_tell_glass_from_walls(simulation, written):
+    labels, grid = read_labels(written.true_classes), read_map(written.true_map)
+    assert np.array_equal(np.isin(labels, (2, 3)), grid.probability == 1.0)
+    glass = 0.05 * (labels == 3).sum()
+    assert glass == pytest.approx(2.0 + 4.0 - 5 * 0.06, rel=0.15)
 
 
 def test_truth_that_cannot_be_written_is_one_clear_line(simulation, tmp_path):

@@ -9,6 +9,7 @@ from tiny_bags import lone_file, odom, scan, write_ros1, write_ros2
 from glassslam.errors import NoScansError, RecordingError, UsageError
 from glassslam.sources import SourceOptions, open_recording
 from glassslam.sources.inspection import inspect_recording
+from glassslam.sources.sonarfile import open_sonar
 
 LOG = "".join(f"FLASER 2 1.0 2.0 0 0 0 {k} 0 0 {k}.5 host {k}.5\n" for k in range(2000)).encode()
 DRIVE = [message for k in range(60) for message in (odom(k / 10), scan(k / 10, [1.0] * 50))]
@@ -149,6 +150,36 @@ def test_flipped_bytes_never_escape_as_foreign_errors(tmp_path, kind, seed):
         content[place] ^= 1 << (k % 8)
     path.write_bytes(content)
     for read in (drain, inspect_recording):
+        try:
+            read(path)
+        except (RecordingError, UsageError) as error:
+            one_line(error)
+
+
+PLAYER = "## Player version 2.1.1\n" + "".join(
+    f"{k}.500 1 6665 sonar 00 004 001 2 +0.1 0 +1.5 0 0 0\n"
+    f"{k}.600 1 6665 position2d 00 001 001 {k} 0 0 0 0 0 0\n"
+    f"{k}.700 1 6665 laser 00 001 001 1 -1.5 +1.5 +1.5 8.0 3 1.0 0 2.0 0 3.0 1\n"
+    f"{k}.800 1 6665 sonar 00 001 001 2 1 {k}\n"
+    for k in range(60)
+)
+PIMAP = "".join(f"{k} {k} {k} 63{k + 10**16} 5 5 1.{k} 2.5\n" for k in range(200))
+
+
+@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("text", [PLAYER, PIMAP], ids=["Player", "pi-map"])
+def test_flipped_bytes_in_text_logs(tmp_path, text, seed):
+    path = tmp_path / "run.log"
+    content = bytearray(text.encode())
+    for k in range(30):
+        content[(seed * 7919 + k * 104729 + k * k * 31) % len(content)] ^= 1 << ((k + seed) % 8)
+    path.write_bytes(content)
+    ring = tmp_path / "ring.yaml"
+    ring.write_text(
+        "field_of_view_deg: 20\nrange_max: 4\nsonars: [[0, 0, 0], [0, 0, 1], [0, 0, 2], [0, 0, 3]]\n"
+    )
+    sonar = SourceOptions(sonar_ring=ring if text == PIMAP else None)
+    for read in (drain, inspect_recording, lambda file: list(open_sonar(file, sonar).records(str))):
         try:
             read(path)
         except (RecordingError, UsageError) as error:

@@ -1,10 +1,12 @@
 """What inspect says of a recording."""
 
+import itertools
 import json
 import math
 
 import pytest
 from tiny_bags import T0, imu, odom, scan, tf, write_ros1, write_ros2
+from tiny_sonar import echoes, range_array, sonar
 
 from glassslam.cli import main
 from glassslam.sources.inspection import inspect_recording
@@ -12,8 +14,10 @@ from glassslam.sources.inspection import inspect_recording
 
 @pytest.fixture
 def report(tmp_path):
+    numbers = itertools.count()
+
     def make(*messages):
-        return inspect_recording(write_ros1(tmp_path / "run.bag", messages))
+        return inspect_recording(write_ros1(tmp_path / f"run{next(numbers)}.bag", messages))
 
     return make
 
@@ -153,3 +157,77 @@ def test_command_on_a_missing_file(tmp_path, capsys):
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err == f"error: {tmp_path / 'nowhere.bag'} does not exist\n"
+
+
+def test_a_ring_of_sonars(report):
+    mount = tf(0.0, "base_link", "sonar_0", (0.3, 0.0, 0.0), topic="/tf_static")
+    ranges = [sonar(k / 10, 5.0 if k % 4 == 0 else 1.0 + k / 100) for k in range(40)]
+    found = report(mount, odom(0.0), scan(0.0), *ranges)
+    (ring,) = found.sonars
+    assert (ring.topics, ring.ring, ring.sonars) == (("/sonar",), "as recorded", 1)
+    assert (ring.stamps.count, ring.rate) == (40, pytest.approx(10.0))
+    assert ring.shares == {"echo": 0.75, "no_echo": 0.25, "not_new": 0.0}
+    assert (ring.limit, ring.cycle) == (5.0, 0.0)
+    assert ring.percentiles[1] == pytest.approx(1.2, abs=0.02)
+    assert (found.plan.sonar_topics, found.plan.sonar_ring) == (("/sonar",), "as recorded")
+
+
+def test_a_3d_sensor(report):
+    clouds = [echoes(k / 10, [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]) for k in range(10)]
+    (sensor,) = report(odom(0.0), scan(0.0), *clouds).sonars
+    assert (sensor.sonars, sensor.ring, sensor.shares) == (0, "", {})
+    assert sensor.points_per_message == 2.0
+    assert sensor.percentiles == pytest.approx((1.0, 1.0, 2.0))
+
+
+def test_sonar_of_a_recording_without_scans(report):
+    found = report(*(echoes(k / 10, [[1.0, 0.0, 0.0]]) for k in range(10)))
+    assert found.sonars[0].stamps.count == 10
+    assert found.plan.problem.startswith("no laser scan in")
+    assert found.warnings[0].startswith("no transform from a base frame to toposens")
+
+
+def test_why_sonar_is_not_used(report):
+    reason = "sonar is not used: no transform from a base frame to the sonars sonar_0 (--sonar-ring NAME or"
+    assert report(sonar(0.0, 1.0), sonar(0.1, 1.0)).warnings[0].startswith(reason)
+    usable = report(odom(0.0), scan(0.0), sonar(0.0, 1.0))
+    assert usable.sonars == ()
+    assert any(warning.startswith("sonar is not used") for warning in usable.warnings)
+
+
+def test_sonar_rows_of_the_command(tmp_path, capsys):
+    ring = tmp_path / "mine.yaml"
+    ring.write_text("field_of_view_deg: 20\nrange_max: 3\nsonars: [[0, 0, 0], [0, 0, 90]]\n")
+    sweeps = [range_array(k / 20, [3.0, 1.0 + k // 4 / 50]) for k in range(160)]
+    path = write_ros2(tmp_path / "run", [odom(0.0), scan(0.0), *sweeps])
+    assert main(["inspect", str(path), "--sonar-topic", "/sonar_array", "--sonar-ring", str(ring)]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "sonar /sonar_array 160 messages, every 50.0 ms" in text
+    assert "2 sonars, ring mine, limits 0 to 3 m" in text
+    assert "each measures every 0.20 s" in text
+    assert "map would use scans /scan, odometry /odom sonar /sonar_array, ring mine" in text
+
+
+def test_a_wrong_wish_is_told_as_map_would(tmp_path, capsys):
+    path = write_ros1(tmp_path / "run.bag", [odom(0.0), scan(0.0), range_array(0.1, [1.0])])
+    assert main(["inspect", str(path), "--sonar-ring", "pionier-2dx"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "map would stop unknown sonar ring 'pionier-2dx' did you mean 'pioneer-2dx'?" in text
+
+
+def test_sonar_of_a_second_file_that_is_unknown(tmp_path, capsys):
+    path = write_ros1(tmp_path / "run.bag", [odom(0.0), scan(0.0)])
+    (tmp_path / "sonar.txt").write_text("hello\n")
+    assert main(["inspect", str(path), "--sonar", str(tmp_path / "sonar.txt")]) == 1
+    assert capsys.readouterr().err == (
+        f"error: {tmp_path / 'sonar.txt'} is no recording known here"
+        " (sonar is read from ROS bags, mcap, Player logs and the text logs of pi-map)\n"
+    )
+
+
+def test_many_topics_are_shortened(tmp_path, capsys):
+    mounts = [tf(0.0, "base_link", f"s{k}", (0.1 * k, 0.0, 0.0), topic="/tf_static") for k in range(5)]
+    ranges = [sonar(0.1, 1.0 + k, topic=f"/s{k}", frame=f"s{k}") for k in range(5)]
+    path = write_ros1(tmp_path / "run.bag", [*mounts, odom(0.0), scan(0.0), *ranges])
+    assert main(["inspect", str(path)]) == 0
+    assert "sonar /s0 ... /s4 (5 topics)" in " ".join(capsys.readouterr().out.split())

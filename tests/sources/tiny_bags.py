@@ -42,20 +42,20 @@ def _time(store, at):
     return store.types["builtin_interfaces/msg/Time"](nanoseconds // 10**9, nanoseconds % 10**9)
 
 
-def _header(store, at, frame):
+def header(store, at, frame):
     fields = {"stamp": _time(store, at), "frame_id": frame}
     if store is ROS1:
         fields["seq"] = 0
     return store.types["std_msgs/msg/Header"](**fields)
 
 
-def _floats(values):
+def floats(values):
     return np.asarray(values, dtype=np.float32)
 
 
 def _echoes(store, beams):
     echo = store.types["sensor_msgs/msg/LaserEcho"]
-    return [echo(echoes=_floats(beam)) for beam in beams]
+    return [echo(echoes=floats(beam)) for beam in beams]
 
 
 def scan(
@@ -83,10 +83,10 @@ def scan(
     geometry.update(fields)
 
     def build(store):
-        pack = (lambda values: _echoes(store, values)) if echoes else _floats
-        header = _header(store, header_time, frame)
+        pack = (lambda values: _echoes(store, values)) if echoes else floats
+        stamped = header(store, header_time, frame)
         kind = store.types[MULTI_ECHO if echoes else LASER_SCAN]
-        return kind(header=header, **geometry, ranges=pack(ranges), intensities=pack(intensities))
+        return kind(header=stamped, **geometry, ranges=pack(ranges), intensities=pack(intensities))
 
     return Sent(topic, MULTI_ECHO if echoes else LASER_SCAN, at, build)
 
@@ -125,7 +125,7 @@ def odom(
         pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](x, y, 0.0), rotation)
         twist = types["geometry_msgs/msg/Twist"](_vector(store, 0.0, 0.0, 0.0), _vector(store, 0.0, 0.0, 0.0))
         return types[ODOMETRY](
-            header=_header(store, T0 + at, "odom"),
+            header=header(store, T0 + at, "odom"),
             child_frame_id=child,
             pose=types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
             twist=types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
@@ -148,7 +148,7 @@ def imu(
         covariance = np.zeros(9)
         covariance[0] = -1.0 if without_gyroscope else 0.0
         return store.types[IMU](
-            header=_header(store, T0 + at, frame),
+            header=header(store, T0 + at, frame),
             orientation=_quaternion(store, 0, 0, 0),
             orientation_covariance=np.zeros(9),
             angular_velocity=_vector(store, *rate),
@@ -177,8 +177,8 @@ def tf(
         transform = types["geometry_msgs/msg/Transform"](
             _vector(store, *position), _quaternion(store, *rotation)
         )
-        header = _header(store, T0 + at, parent)
-        stamped = types["geometry_msgs/msg/TransformStamped"](header, child, transform)
+        stamp = header(store, T0 + at, parent)
+        stamped = types["geometry_msgs/msg/TransformStamped"](stamp, child, transform)
         return types[msgtype](transforms=[stamped])
 
     return Sent(topic, msgtype, at, build)

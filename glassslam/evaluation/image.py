@@ -1,0 +1,265 @@
+"""How much a map looks like the true map: the image metrics of pi-map, and the overlap of its classes."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glassslam.errors import EvaluationError
+from glassslam.evaluation.image_alignment import Outline, best_motions
+from glassslam.geometry import inverse, transform_points
+from glassslam.outputs.map_server import FREE, FREE_THRESH, OCCUPIED, OCCUPIED_THRESH, UNKNOWN
+from glassslam.records import FloatArray
+from glassslam.slam.result import OccupancyMap
+
+Mask: TypeAlias = NDArray[np.bool_]
+Classes: TypeAlias = NDArray[np.uint8]
+
+MARGIN = 1.0
+"""How far the compared region reaches beyond what the truth knows, m."""
+
+_UNKNOWN, _FREE, _SOLID, _GLASS = range(4)
+_GREY = np.array([UNKNOWN, FREE, OCCUPIED, OCCUPIED], dtype=np.uint8)
+_SSIM_WINDOW = 7
+
+
+@dataclass(frozen=True, slots=True)
+class ImageErrors:
+    """Likeness of a map and the truth.
+
+    Attributes
+    ----------
+    mse : float
+        Mean square difference of the grey values 0 (occupied), 205 (unknown) and 254 (free).
+    ssim : float
+        Structural similarity (Wang et al. 2004), windows of 7 x 7 cells; 1 for equal maps.
+    ncc : float
+        Zero-mean normalised cross-correlation; 1 for equal maps.
+    iou_occupied, iou_free, iou_unknown : float or None
+        Cells of a class in both maps over cells of that class in either; None where neither has any.
+    iou_glass : float or None
+        The same for glass; None as well where a map comes without classes.
+    rows, columns : int
+        Size of the compared region, cells.
+    resolution : float
+        Edge of a cell, m.
+    map_from_truth : tuple of float
+        Motion x, y, theta applied to the truth, m and rad.
+    """
+
+    mse: float
+    ssim: float
+    ncc: float
+    iou_occupied: float | None
+    iou_free: float | None
+    iou_unknown: float | None
+    iou_glass: float | None
+    rows: int
+    columns: int
+    resolution: float
+    map_from_truth: tuple[float, float, float]
+
+
+def evaluate_image(
+    grid: OccupancyMap,
+    truth: OccupancyMap,
+    *,
+    glass: Mask | None = None,
+    true_glass: Mask | None = None,
+    map_from_truth: tuple[float, float, float] | None = None,
+    seed: int = 0,
+) -> ImageErrors:
+    """Compare a map with the true map after laying the truth onto it (pi-map, section IV-B).
+
+    Both are reduced to occupied, free and unknown, and the truth is drawn anew in the cells of the map. The
+    region compared is the rectangle, along the axes of the map, around all that the truth knows, and
+    `MARGIN` beyond: it does not depend on the map, so that no map gains by reaching far or by ending early;
+    what a map does not cover is unknown.
+
+    Parameters
+    ----------
+    grid, truth : OccupancyMap
+        The map and the true map; they may differ in frame, size and resolution.
+    glass, true_glass : ndarray of bool, shape as the map and as the truth, optional
+        Which of their cells are glass.
+    map_from_truth : tuple of float, optional
+        Motion x, y, theta, m and rad, where it is known; searched with `align_maps` when omitted.
+    seed : int
+        Seed of the search.
+
+    Raises
+    ------
+    EvaluationError
+        A map has no occupied cell, the region is smaller than a window of SSIM, or glass does not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from glassslam.evaluation import evaluate_image
+    >>> from glassslam.slam.result import OccupancyMap
+    >>> room = np.zeros((20, 30), dtype=np.float32)
+    >>> room[[0, -1]] = room[:, [0, -1]] = 1.0
+    >>> errors = evaluate_image(OccupancyMap(room, 0.1, (0, 0)), OccupancyMap(room, 0.1, (0, 0)))
+    >>> errors.mse, round(errors.ssim, 9), round(errors.ncc, 9)
+    (0.0, 1.0, 1.0)
+    """
+    classes, true_classes = _classes(grid, glass, "the map"), _classes(truth, true_glass, "the truth")
+    motion = np.array(map_from_truth or align_maps(grid, truth, seed=seed), dtype=np.float64)
+    low, shape = _region(grid, truth, true_classes, motion)
+    mine = _cut(classes, grid, low, shape)
+    true = _drawn(true_classes, truth, motion, grid, low, shape)
+    if min(shape) < _SSIM_WINDOW:
+        raise EvaluationError(f"the truth covers {shape[1]} x {shape[0]} cells", "SSIM needs 7 x 7 cells")
+    return ImageErrors(
+        **_image_metrics(_GREY[mine], _GREY[true]),
+        iou_occupied=_iou(mine >= _SOLID, true >= _SOLID),
+        iou_free=_iou(mine == _FREE, true == _FREE),
+        iou_unknown=_iou(mine == _UNKNOWN, true == _UNKNOWN),
+        iou_glass=None if glass is None or true_glass is None else _iou(mine == _GLASS, true == _GLASS),
+        rows=shape[0],
+        columns=shape[1],
+        resolution=grid.resolution,
+        map_from_truth=(float(motion[0]), float(motion[1]), float(motion[2])),
+    )
+
+
+def align_maps(grid: OccupancyMap, truth: OccupancyMap, *, seed: int = 0) -> tuple[float, float, float]:
+    """Motion x, y, theta (m, rad) that lays the truth onto the map.
+
+    Among the motions under which the walls meet (see `best_motions`), it is the one under which most cells
+    that are known in both maps agree: rooms that look alike from two sides differ in what is free.
+
+    Raises
+    ------
+    EvaluationError
+        A map has no occupied cell.
+    """
+    outlines = [_outline(part, name) for part, name in ((grid, "the map"), (truth, "the truth"))]
+    motions = best_motions(outlines[0], outlines[1], seed)
+    best = max(motions, key=lambda motion: agreement(grid, truth, motion))
+    return float(best[0]), float(best[1]), float(best[2])
+
+
+def agreement(grid: OccupancyMap, truth: OccupancyMap, map_from_truth: FloatArray) -> float:
+    """Overlap of what is free plus overlap of what is occupied, between 0 and 2, on the cells of the map."""
+    classes = _classes(grid, None, "the map")
+    true = _drawn(
+        _classes(truth, None, "the truth"),
+        truth,
+        map_from_truth,
+        grid,
+        np.zeros(2, dtype=np.int64),
+        classes.shape,
+    )
+    shares = [_iou(classes == kind, true == kind) or 0.0 for kind in (_FREE, _SOLID)]
+    return sum(shares)
+
+
+def normalised_cross_correlation(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:
+    """Zero-mean normalised cross-correlation of two images of one size, between -1 and 1.
+
+    sum (a - mean a)(b - mean b) / sqrt(sum (a - mean a)^2 sum (b - mean b)^2). The MSE and NCC of Table I of
+    pi-map fit each other in this form and in no other. An image of one grey correlates with nothing: 1 for
+    equal images, else 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from glassslam.evaluation.image import normalised_cross_correlation
+    >>> a = np.array([[0, 254], [254, 0]], dtype=np.uint8)
+    >>> normalised_cross_correlation(a, 254 - a)
+    -1.0
+    """
+    if np.array_equal(a, b):
+        return 1.0
+    x, y = a.astype(np.float64) - a.mean(), b.astype(np.float64) - b.mean()
+    scale = float(np.sqrt((x * x).sum() * (y * y).sum()))
+    return float((x * y).sum()) / scale if scale > 0.0 else 0.0
+
+
+def _image_metrics(mine: NDArray[np.uint8], true: NDArray[np.uint8]) -> dict[str, float]:
+    from skimage.metrics import structural_similarity  # noqa: PLC0415  (slow to import)
+
+    ssim = structural_similarity(  # type: ignore[no-untyped-call]
+        true, mine, win_size=_SSIM_WINDOW, data_range=255
+    )
+    difference = mine.astype(np.float64) - true
+    return {
+        "mse": float((difference**2).mean()),
+        "ssim": float(ssim),
+        "ncc": normalised_cross_correlation(mine, true),
+    }
+
+
+def _classes(grid: OccupancyMap, glass: Mask | None, name: str) -> Classes:
+    classes = np.zeros(grid.probability.shape, dtype=np.uint8)
+    classes[grid.probability < FREE_THRESH] = _FREE
+    classes[grid.probability > OCCUPIED_THRESH] = _SOLID
+    if glass is not None:
+        if glass.shape != classes.shape:
+            raise EvaluationError(f"{name} has {classes.shape} cells, its classes have {glass.shape}")
+        classes[glass & (classes == _SOLID)] = _GLASS
+    return classes
+
+
+def _outline(grid: OccupancyMap, name: str) -> Outline:
+    occupied = grid.probability > OCCUPIED_THRESH
+    if not occupied.any():
+        raise EvaluationError(f"{name} has no occupied cell", "there is nothing to align")
+    return Outline.of(occupied, grid.origin, grid.resolution)
+
+
+def _region(
+    grid: OccupancyMap, truth: OccupancyMap, true_classes: Classes, motion: FloatArray
+) -> tuple[NDArray[np.int64], tuple[int, int]]:
+    """First cell (column, row) and shape of what is compared, in cells of the map."""
+    rows, columns = np.nonzero(true_classes)
+    if rows.size == 0:
+        raise EvaluationError("the truth knows no cell", "is it the right file?")
+    centres = np.asarray(truth.origin) + (np.stack((columns, rows), axis=1) + 0.5) * truth.resolution
+    moved = (transform_points(motion, centres) - np.asarray(grid.origin)) / grid.resolution
+    margin = MARGIN / grid.resolution
+    low = np.floor(moved.min(axis=0) - margin).astype(np.int64)
+    high = np.ceil(moved.max(axis=0) + margin).astype(np.int64)
+    return low, (int(high[1] - low[1]), int(high[0] - low[0]))
+
+
+def _cut(classes: Classes, grid: OccupancyMap, low: NDArray[np.int64], shape: tuple[int, int]) -> Classes:
+    out = np.zeros(shape, dtype=np.uint8)
+    rows, columns = grid.probability.shape
+    top, left = max(0, -int(low[1])), max(0, -int(low[0]))
+    part = classes[max(0, int(low[1])) : max(0, min(rows, int(low[1]) + shape[0])),
+                   max(0, int(low[0])) : max(0, min(columns, int(low[0]) + shape[1]))]  # fmt: skip
+    out[top : top + part.shape[0], left : left + part.shape[1]] = part[: shape[0] - top, : shape[1] - left]
+    return out
+
+
+def _drawn(
+    true_classes: Classes,
+    truth: OccupancyMap,
+    motion: FloatArray,
+    grid: OccupancyMap,
+    low: NDArray[np.int64],
+    shape: tuple[int, int],
+) -> Classes:
+    """The truth in cells of the map; of the finer cells within one, the occupied win, then the free."""
+    finer = max(1, round(grid.resolution / truth.resolution))
+    truth_from_map = inverse(motion)
+    out = np.zeros(shape, dtype=np.uint8)
+    for step in np.ndindex(finer, finer):
+        within = (np.array(step) + 0.5) / finer
+        columns, rows = np.meshgrid(np.arange(shape[1]) + within[0], np.arange(shape[0]) + within[1])
+        places = np.stack((columns.ravel() + low[0], rows.ravel() + low[1]), axis=1) * grid.resolution
+        cells = transform_points(truth_from_map, places + np.asarray(grid.origin)) - np.asarray(truth.origin)
+        index = np.floor(cells / truth.resolution + 1e-9).astype(np.int64)
+        inside = (index >= 0).all(axis=1) & (index < np.array(true_classes.shape)[::-1]).all(axis=1)
+        found = np.zeros(len(index), dtype=np.uint8)
+        found[inside] = true_classes[index[inside, 1], index[inside, 0]]
+        out = np.maximum(out, found.reshape(shape))
+    return out
+
+
+def _iou(a: Mask, b: Mask) -> float | None:
+    either = int((a | b).sum())
+    return float((a & b).sum() / either) if either else None

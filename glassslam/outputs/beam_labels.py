@@ -1,0 +1,93 @@
+"""glass_beams.npz: what the glass detector said about single beams."""
+
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detectors.labels import GHOST, GLASS
+from glassslam.errors import GlassSlamError, OutputError
+from glassslam.glass.beam_labels import GlassBeams
+
+_COLUMNS = {"stamps": np.float64, "scan": np.int64, "beam": np.int32, "count": np.int32, "label": np.uint8}
+
+
+def write_beam_labels(beams: GlassBeams, path: Path) -> Path:
+    """Write the runs of labelled beams and the stamps of all scans looked at, compressed.
+
+    The arrays are those of `GlassBeams`; see docs/formats.md.
+    """
+    with path.open("wb") as file:
+        np.savez_compressed(file, **{name: getattr(beams, name) for name in _COLUMNS})
+    return path
+
+
+def read_beam_labels(path: str | Path) -> GlassBeams:
+    """Read what `write_beam_labels` has written.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be read, is no npz, or does not hold runs of labelled beams.
+    """
+    arrays = read_arrays(path, tuple(_COLUMNS), "it is written by map when a glass detector is on")
+    if not _fits(arrays):
+        raise OutputError(f"{path} does not hold the labels of beams", "expected glass_beams.npz of map")
+    return GlassBeams(**{name: arrays[name].astype(kind) for name, kind in _COLUMNS.items()})
+
+
+def read_arrays(
+    path: str | Path,
+    names: tuple[str, ...],
+    hint: str,
+    optional: tuple[str, ...] = (),
+    kind: type[GlassSlamError] = OutputError,
+) -> dict[str, NDArray[np.generic]]:
+    """Named arrays of an npz file; never an object that would have to be unpickled.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    names, optional : tuple of str
+        Arrays it must hold, and arrays it may hold.
+    hint : str
+        Where such a file comes from.
+    kind : type of GlassSlamError
+        What to raise.
+
+    Raises
+    ------
+    GlassSlamError
+        Of that kind: the file cannot be read, is no npz, or lacks an array.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            content = np.load(file, allow_pickle=False)
+            if not isinstance(content, np.lib.npyio.NpzFile):
+                raise kind(f"{path} is no npz file", hint)
+            if missing := [name for name in names if name not in content.files]:
+                raise kind(f"{path} has no array {missing[0]!r}", hint)
+            return {name: content[name] for name in (*names, *optional) if name in content.files}
+    except OSError as error:
+        raise kind(f"cannot read {path}: {error.strerror or 'damaged'}", hint) from error
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise kind(f"{path} is no npz file", hint) from error
+
+
+def _fits(arrays: dict[str, NDArray[np.generic]]) -> bool:
+    """Whether the arrays are runs of beams of the scans."""
+    if any(array.ndim != 1 or array.dtype.kind not in "iuf" for array in arrays.values()):
+        return False
+    scan, beam, count, label = (arrays[name] for name in ("scan", "beam", "count", "label"))
+    if not len(scan) == len(beam) == len(count) == len(label):
+        return False
+    if any(array.dtype.kind == "f" for array in (scan, beam, count, label)):
+        return False
+    stamps = arrays["stamps"]
+    inside = (scan >= 0) & (scan < len(stamps)) & (beam >= 0) & (count > 0)  # type: ignore[operator]
+    return bool(
+        inside.all() and np.isin(label, (GLASS, GHOST)).all() and np.isfinite(stamps.astype(np.float64)).all()
+    )

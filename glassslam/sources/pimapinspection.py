@@ -1,0 +1,40 @@
+"""Text logs of pi-map looked over."""
+
+from collections.abc import Sequence
+
+from glassslam.sources.formats import Piece
+from glassslam.sources.pimap import POSE_VALUES, read_pimap_sonar
+from glassslam.sources.report import Plan, RecordingReport, TopicReport
+
+
+def inspect_pimap(pieces: Sequence[Piece], plan: Plan) -> RecordingReport:
+    """Read logs and report what they hold.
+
+    Raises
+    ------
+    RecordingError
+        A file is damaged.
+    """
+    topics, begin, end = [], float("inf"), float("-inf")
+    for piece in pieces:
+        times, values = read_pimap_sonar(piece.path)
+        begin, end = min(begin, float(times[0])), max(end, float(times[-1]))
+        length = float(times[-1] - times[0])
+        kind = "pi-map poses" if values.shape[1] == POSE_VALUES else "pi-map ranges"
+        rate = len(times) / length if length > 0.0 else 0.0
+        topics.append(TopicReport(piece.path.name, kind, len(times), rate))
+    return RecordingReport(
+        paths=tuple(str(piece.path) for piece in pieces),
+        format="pimap",
+        size=sum(piece.path.stat().st_size for piece in pieces),
+        begin=begin,
+        duration=end - begin,
+        topics=tuple(topics),
+        scans=(),
+        odometry=(),
+        imus=(),
+        transforms=(),
+        plan=plan,
+        dropped={},
+        warnings=(),
+    )

@@ -1,0 +1,217 @@
+"""`glassslam calibrate` and `map --calibration`: what they pass on, print and return."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import glassslam.calibration
+from detectors.diffuse_fit import SurfaceSamples
+from detectors.profiles import load_profile
+from glassslam import api
+from glassslam.calibration import CalibrationResult, RecordingSummary
+from glassslam.cli import main
+from glassslam.cli.calibrate import value_rows
+from glassslam.cli.settings import calibration_assignments, calibration_warnings, resolve_config
+
+
+@pytest.fixture
+def result():
+    none = np.empty(0)
+    return CalibrationResult(
+        calibration=load_profile("utm30lx"),
+        recordings=(RecordingSummary("one.bag", "glass", 1.0, 15, 12, 11, 10, 1.143),),
+        warnings=("panes were tried from 10 places",),
+        panes=(),
+        surfaces=SurfaceSamples(none, none, none),
+        proven=True,
+    )
+
+
+@pytest.fixture
+def calls(monkeypatch, result):
+    """Sessions and options of the calibration, which itself is replaced."""
+    seen = []
+
+    def calibrate(sessions, **options):
+        seen.append((sessions, options))
+        return result
+
+    monkeypatch.setattr(glassslam.calibration, "calibrate", calibrate)
+    return seen
+
+
+def test_the_procedure_of_two_distances(calls, tmp_path, capsys):
+    words = [
+        "one.bag",
+        "two.bag",
+        "--distance",
+        "1",
+        "--distance",
+        "2",
+        "--material",
+        "glass",
+        "--roi",
+        "-20:20",
+    ]
+    assert main(["calibrate", *words, "-o", str(tmp_path / "out"), "--name", "mine"]) == 0
+    ((sessions, options),) = calls
+    assert [(s.name, s.material, s.distance) for s in sessions] == [
+        ("one.bag", "glass", 1.0),
+        ("two.bag", "glass", 2.0),
+    ]
+    assert str(sessions[1].roi) == "at bearings from -20 to 20 deg"
+    assert (options["name"], options["align"]) == ("mine", False)
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    for text in ("1.14 m", "thresh 10254", "11 of 11 = 100.0% (74% to 100%)", "warning: panes were tried"):
+        assert text in captured.out
+    assert (tmp_path / "out" / "calibration.yaml").is_file()
+    assert (tmp_path / "out" / "calibration.png").is_file()
+
+
+def test_a_mixed_call(calls, tmp_path):
+    words = ["a.bag", "b.bag", "c.bag", "--distance", "1", "--distance", "-", "--distance", "-"]
+    words += ["--panes", "-", "--panes", "p.geojson", "--panes", "-", "--align"]
+    words += ["--material", "acrylic", "--material", "glass", "--material", "no-glass"]
+    words += ["--start", "2", "--duration", "9", "--scan-topic", "/front"]
+    assert main(["calibrate", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
+    ((sessions, options),) = calls
+    assert [(s.material, s.distance, s.panes) for s in sessions] == [
+        ("acrylic", 1.0, None),
+        ("glass", None, Path("p.geojson")),
+        ("no-glass", None, None),
+    ]
+    assert options["align"]
+    source = options["options"]
+    assert (source.start, source.duration, source.scan_topic) == (2.0, 9.0, "/front")
+
+
+def test_without_a_directory_it_is_named_after_the_recording(calls, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["calibrate", "some/run.bag", "--quiet"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["run-calibration"]
+
+
+def test_json_is_the_calibration_and_nothing_else(calls, tmp_path, capsys):
+    assert main(["calibrate", "run.bag", "-o", str(tmp_path / "out"), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["directory"] == str(tmp_path / "out")
+    assert report["calibration"]["thresh"] == 10254.0
+    assert report["calibration"]["saturation"] is None
+    assert report["proven"] is True
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("a.bag b.bag --distance 1 --distance 2 --distance 3", "3 values of --distance for 2 recordings"),
+        ("a.bag --material glass", "a.bag: nothing says where the glass is"),
+        ("a.bag --roi left", "--roi left: no region"),
+        ("a.bag --distance 1 --align", "--align needs --panes"),
+        ("a.bag --start -1", "start must be a time of 0 s or more, not -1"),
+    ],
+)
+def test_wrong_usage(calls, tmp_path, capsys, words, message):
+    assert main(["calibrate", *words.split(), "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {message}")
+    assert error.count("\n") == 1
+    assert calls == []
+
+
+def test_an_earlier_calibration_is_found_before_any_work_is_done(calls, tmp_path, capsys):
+    (tmp_path / "calibration.yaml").write_text("old")
+    assert main(["calibrate", "run.bag", "-o", str(tmp_path)]) == 2
+    assert "already holds results (use --overwrite to replace them)" in capsys.readouterr().err
+    assert calls == []
+
+
+def test_a_recording_that_is_none(tmp_path, capsys):
+    assert main(["calibrate", str(tmp_path / "none.bag"), "-o", str(tmp_path / "out")]) == 1
+    assert "none.bag" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_unproven_thresholds_are_called_so(result):
+    rows = dict(value_rows(replace(result, proven=False)))
+    assert rows["calibrated_peak"].endswith("(unproven)")
+    assert "pane" not in rows
+
+
+@pytest.fixture
+def mapped(monkeypatch, tiny_result):
+    """Configurations with which a map was asked for."""
+    seen = []
+
+    def map_nothing(recordings, config, *, source_options, progress):
+        seen.append(config)
+        return tiny_result
+
+    monkeypatch.setattr(api, "map_recording", map_nothing)
+    return seen
+
+
+def written(tmp_path, **changes):
+    path = tmp_path / "calibration.yaml"
+    path.write_text(yaml.safe_dump(load_profile("utm30lx").to_dict() | changes))
+    return path
+
+
+def test_map_embeds_the_calibration(mapped, tmp_path):
+    path = written(tmp_path)
+    assert main(["map", "run.bag", "--calibration", str(path), "-o", str(tmp_path / "out"), "-q"]) == 0
+    (config,) = mapped
+    assert config.glass.detector == "calibrated_peak"
+    assert config.glass.calibration == load_profile("utm30lx").to_dict()
+    assert (config.glass.thresh, config.glass.grad, config.glass.width) == (10254.0, 512.7, 20)
+
+
+def test_later_assignments_go_before_it(mapped, tmp_path):
+    words = ["--calibration", str(written(tmp_path)), "--set", "glass.detector=intensity_peak"]
+    assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert mapped[0].glass.detector == "intensity_peak"
+
+
+def test_a_calibration_without_thresholds_leaves_the_defaults(tmp_path):
+    path = written(tmp_path, thresh=0.0, grad=0.0, width=0)
+    assert resolve_config(None, calibration_assignments(path, None)).glass.thresh == 3000.0
+
+
+def test_a_calibration_that_rules_glass_out_is_told(tmp_path):
+    path = written(tmp_path, detector="off", sensor="lms511")
+    config = resolve_config(None, calibration_assignments(path, None))
+    assert config.glass.detector == "off"
+    assert calibration_warnings(config) == [
+        "glass is not looked for: by its calibration the intensities of lms511 cannot show it"
+    ]
+    assert calibration_warnings(resolve_config(None, ["glass.detector=off"])) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "cannot read calibration {path}: No such file or directory"),
+        ("a: 1", "{path} is no calibration"),
+        ("sensor: x\ndiffuse: {ranges: [1], levels: [0]}", "calibration {path}: ranges of a diffuse curve"),
+    ],
+)
+def test_a_file_that_is_no_calibration(mapped, tmp_path, capsys, text, message):
+    path = tmp_path / "c.yaml"
+    if text is not None:
+        path.write_text(text)
+    assert main(["map", "run.bag", "--calibration", str(path), "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {message.format(path=path)}")
+    assert error.count("\n") == 1
+    assert mapped == []
+
+
+def test_a_calibration_and_a_sensor_exclude_each_other(mapped, tmp_path, capsys):
+    words = ["--calibration", str(written(tmp_path)), "--sensor", "utm30lx"]
+    assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.startswith("error: --calibration and --sensor exclude each other")
+    assert mapped == []

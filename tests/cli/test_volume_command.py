@@ -1,0 +1,134 @@
+"""`glassslam volume`: what it reads, writes and says."""
+
+import json
+
+import pytest
+
+from glassslam.cli.app import main
+from glassslam.outputs import read_map
+from glassslam.simulation import Scene, simulate, write_recording
+from glassslam.volume.storage import load_volume
+
+ROOM = {
+    "name": "room",
+    "walls": [
+        {"name": "room", "material": "plaster", "points": [[0, 0], [6, 0], [6, 6], [0, 6]], "closed": True}
+    ],
+    "posts": [
+        {"name": "lamp", "material": "wood", "radius": 0.2, "at": [[4.5, 3]], "z_low": 0.8, "z_high": 1.2}
+    ],
+    "drive": {"waypoints": [{"at": [2, 3]}, {"at": [4, 3]}]},
+    "ultrasonic": {},
+}
+FILES = [
+    "volume.npz",
+    "volume.bt",
+    "volume.ply",
+    "volume.png",
+    "slices.png",
+    "volume_map.yaml",
+    "volume_map.pgm",
+]
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """A recording with scans and points, its truth beside it."""
+    path = tmp_path_factory.mktemp("bags") / "room.bag"
+    write_recording(simulate(Scene.model_validate(ROOM), "rplidar"), path)
+    return path
+
+
+def truth(bag):
+    return str(bag.with_name("room.bag.truth.tum"))
+
+
+def test_a_recording_becomes_a_volume(bag, tmp_path, capsys):
+    assert main(["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")]) == 0
+    out = capsys.readouterr().out
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == sorted(FILES)
+    assert all(f"wrote {tmp_path / 'run' / name}\n" in out for name in FILES)
+    assert "occupied voxels of 0.05 m" in out
+
+
+def test_the_map_holds_the_lamp_and_the_volume_its_height(bag, tmp_path):
+    main(["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")])
+    grid = read_map(tmp_path / "run" / "volume_map.yaml")
+    column, row = (int((v - o) / 0.05) for v, o in zip((4.3, 3.0), grid.origin, strict=True))
+    assert (grid.probability[row - 2 : row + 3, column - 1 : column + 2] == 1.0).any()
+    tree = load_volume(tmp_path / "run" / "volume.npz")
+    centres = tree.centres(tree.occupied().voxels())
+    centres = centres[(centres[:, 2] > 0.2) & (centres[:, 2] < 2.3)]  # neither floor nor ceiling
+    lamp = centres[(abs(centres[:, 0] - 4.4) < 0.2) & (abs(centres[:, 1] - 3.0) < 0.2)]
+    assert 0.7 < lamp[:, 2].min() < lamp[:, 2].max() < 1.3
+
+
+def test_the_summary_is_json_on_request(bag, tmp_path, capsys):
+    words = [
+        "volume",
+        str(bag),
+        "--trajectory",
+        truth(bag),
+        "-o",
+        str(tmp_path / "run"),
+        "--json",
+        "--pool",
+        "iop",
+    ]
+    assert main([*words, "--resolution", "0.1", "--projection", "pool", "--band", "0.5", "1.5"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["resolution"] == 0.1
+    assert summary["scans"] > 10
+    assert summary["point_sets"] > 50
+    assert summary["dropped"] == {}
+    assert [path.rsplit("/", 1)[-1] for path in summary["written"]] == FILES
+
+
+def test_earlier_results_are_replaced_only_when_asked(bag, tmp_path, capsys):
+    words = [
+        "volume",
+        str(bag),
+        "--trajectory",
+        truth(bag),
+        "-o",
+        str(tmp_path / "run"),
+        "--resolution",
+        "0.2",
+    ]
+    assert main(words) == 0
+    capsys.readouterr()
+    assert main(words) == 2
+    assert "already holds volume.npz (use --overwrite to replace it)" in capsys.readouterr().err
+    assert main([*words, "--overwrite"]) == 0
+
+
+def test_a_band_must_hold_some_height(bag, tmp_path, capsys):
+    assert main(["volume", str(bag), "-o", str(tmp_path / "run"), "--band", "1", "1"]) == 2
+    assert "error: --band 1 1: no height lies between (give the lower one first)" in capsys.readouterr().err
+
+
+def test_a_trajectory_of_another_day_is_refused(bag, tmp_path, capsys):
+    other = tmp_path / "other.tum"
+    other.write_text("1.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n")
+    assert main(["volume", str(bag), "--trajectory", str(other), "-o", str(tmp_path / "run")]) == 1
+    err = capsys.readouterr().err
+    assert "could be placed" in err
+    assert "scan outside of the trajectory" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_points_without_scans_are_enough(data_dir, tmp_path, capsys):
+    recording = data_dir / "toposens" / "test.bag"
+    if not recording.is_file():
+        pytest.skip(f"{recording} is absent")
+    assert main(["volume", str(recording), "-o", str(tmp_path / "run"), "--band", "-2.5", "3"]) == 0
+    assert "0 scans, 4036 points of 1239 pings, 0 pairs" in capsys.readouterr().out
+
+
+def test_a_recording_without_points_is_a_volume_of_the_lidar(tmp_path, capsys):
+    bag = tmp_path / "flat.bag"
+    scene = {key: value for key, value in ROOM.items() if key != "ultrasonic"}
+    write_recording(simulate(Scene.model_validate(scene), "rplidar"), bag)
+    words = ["volume", str(bag), "--trajectory", f"{bag}.truth.tum", "-o", str(tmp_path / "run")]
+    assert main(words) == 0
+    assert "0 points of 0 pings" in capsys.readouterr().out

@@ -1,0 +1,109 @@
+"""The true map of scene 4 of pi-map that we measured."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glassslam.evaluation import read_glass_cells, read_map
+from glassslam.yamlmodel import load_yaml_model
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def load(name):
+    path = ROOT / "tools" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+tool = load("pimap_truth")
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return load_yaml_model(tool.PLAN, tool.Plan)
+
+
+def test_every_line_says_how_it_was_measured(plan):
+    for line in plan.segments:
+        if line.kind == "edge":
+            continue
+        assert 0.0 < line.sigma <= 0.1
+        if line.by == "lidar":
+            assert line.points > 20
+            assert 0.0 < line.scatter < 0.03
+        else:
+            assert line.sigma >= 0.02
+
+
+def test_the_hallway_is_as_large_as_published(plan):
+    drawn = tool.draw(plan)
+    rows, columns = np.nonzero(~np.isnan(drawn.grid.probability))
+    assert 0.05 * (np.ptp(columns) + 1) == pytest.approx(30.5, abs=0.2)
+    assert 0.05 * (np.ptp(rows) + 1) == pytest.approx(5.4, abs=0.25)
+    assert drawn.glass_share == pytest.approx(0.32, abs=0.04)
+
+
+def test_less_the_bend_of_the_poses_the_walls_of_the_hallway_are_straight(plan):
+    pairs = list(zip(plan.segments, plan.lines(straight=True), strict=True))
+    south = np.array(
+        [ends[[1, 3]] for line, ends in pairs if line.name in {f"south-{k}" for k in range(1, 9)}]
+    )
+    glass = np.array([ends[[1, 3]] for line, ends in pairs if line.name.startswith("glass-wall")])
+    assert np.abs(south + 0.78).max() < 0.025
+    assert np.abs(glass - 1.26).max() < 0.015
+    bent = plan.lines(straight=False)
+    assert np.array([[line.start, line.end] for line in plan.segments]).reshape(-1, 4) == pytest.approx(bent)
+
+
+def test_as_measured_the_glass_lies_near_the_line_that_sonars_see(plan):
+    """y = 1.22 + 0.0036 x between x = 4.2 and 27 m, straight through the bend."""
+    ends = plan.lines(straight=False)
+    for line, (x0, y0, x1, y1) in zip(plan.segments, ends, strict=True):
+        if line.name.startswith("glass-wall"):
+            assert np.abs(np.array([y0, y1]) - 1.22 - 0.0036 * np.array([x0, x1])).max() < 0.12
+
+
+def test_edges_bound_what_is_free_and_are_not_drawn(plan):
+    drawn = tool.draw(plan, straight=False)
+    names = {line.name: line for line in plan.segments}
+
+    def at(x, y):
+        column, row = np.floor((np.array([x, y]) - drawn.grid.origin) / 0.05).astype(int)
+        return drawn.grid.probability[row, column]
+
+    limit = names["crossing-south-limit"]
+    middle = np.mean([limit.start, limit.end], axis=0)
+    assert np.isnan(at(*middle))
+    assert at(middle[0], middle[1] + 0.15) == 0.0
+    assert np.isnan(at(middle[0], middle[1] - 0.15))
+    assert at(12.0, 0.2) == 0.0
+    assert np.isnan(at(12.0, 1.6)), "behind the glass nothing is known"
+
+
+def test_the_program_writes_a_map_that_evaluate_reads(tmp_path, capsys):
+    assert tool.main(["-o", str(tmp_path / "truth")]) == 0
+    assert "30.55 m x 5." in capsys.readouterr().out
+    path = tmp_path / "truth" / "pimap_scene4.yaml"
+    assert np.array_equal(
+        read_map(path).probability == 1.0,
+        tool.draw(load_yaml_model(tool.PLAN, tool.Plan)).grid.probability == 1.0,
+    )
+    assert read_glass_cells(path).sum() > 400
+    assert tool.main(["--measure", str(tmp_path)]) == 1
+    assert "does not hold scene4.bag and scene4_pose.txt" in capsys.readouterr().err
+
+
+def test_the_lines_lie_where_the_recording_shows_walls(plan, data_dir):
+    points = tool.returns(data_dir / "pimap")
+    for line in plan.segments:
+        if line.by == "lidar" and line.points > 300:
+            near = tool.across(points, line)
+            assert near.size == pytest.approx(line.points, rel=0.3)
+            assert abs(near.mean()) < 0.006
