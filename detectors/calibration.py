@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Self
 
+from detectors.beam_errors import BeamErrors
 from detectors.diffuse import DiffuseCurve
 from detectors.entries import flag, mapping, number, numbers, text, whole
 
@@ -68,6 +69,8 @@ class Calibration:
         Lobe of the panes that were seen.
     date : str
         Day of the recording, ISO 8601; empty when not known.
+    beam_errors : BeamErrors or None
+        What is wrong with the bearings and ranges; None: not looked for.
     evidence : mapping
         What the figures rest on: recordings, numbers of beams, rates and their intervals. Plain values only.
     """
@@ -90,6 +93,7 @@ class Calibration:
     weakest_decay: float = 2.5
     pane: PaneModel = field(default_factory=PaneModel)
     date: str = ""
+    beam_errors: BeamErrors | None = None
     evidence: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -107,6 +111,7 @@ class Calibration:
         values = asdict(self)
         values["diffuse"]["ranges"] = list(self.diffuse.ranges)
         values["diffuse"]["levels"] = list(self.diffuse.levels)
+        values["beam_errors"] = self.beam_errors.to_dict() if self.beam_errors else None
         values["evidence"] = dict(self.evidence)
         return {"intensity_scale": self.intensity_scale, **values}
 
@@ -183,6 +188,10 @@ def _no_echo(name: str, value: Any) -> float | None:
     return None if value is None else number(name, value, 0.0, infinite=True)
 
 
+def _beam_errors(name: str, value: Any) -> BeamErrors | None:
+    return None if value is None else BeamErrors.from_dict(name, value)
+
+
 _READERS: dict[str, Callable[[str, Any], Any]] = {
     "sensor": text,
     "diffuse": _diffuse,
@@ -202,5 +211,6 @@ _READERS: dict[str, Callable[[str, Any], Any]] = {
     "weakest_decay": _number(0.0),
     "pane": _pane,
     "date": text,
+    "beam_errors": _beam_errors,
     "evidence": mapping,
 }

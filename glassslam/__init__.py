@@ -35,7 +35,16 @@ if TYPE_CHECKING:
     from glassslam.matching import BranchAndBoundMatcher, match_scan
     from glassslam.outputs import read_g2o, read_map, read_tum, write_results
     from glassslam.posegraph import PoseGraph
-    from glassslam.records import Imu, LaserScan, Odometry, RecordingInfo, Trajectory
+    from glassslam.records import (
+        Imu,
+        LaserScan,
+        Odometry,
+        PointSet,
+        RangeRing,
+        RecordingInfo,
+        SonarRing,
+        Trajectory,
+    )
     from glassslam.slam.mapper import Mapper
     from glassslam.slam.result import MapResult, OccupancyMap
     from glassslam.sources import SourceOptions, open_recording
@@ -51,11 +60,14 @@ _HOMES = {
     "Mapper": "glassslam.slam.mapper",
     "OccupancyMap": "glassslam.slam.result",
     "Odometry": "glassslam.records",
+    "PointSet": "glassslam.records",
     "PoseGraph": "glassslam.posegraph",
     "ProbabilityGrid": "glassslam.grid.probability_grid",
     "Progress": "glassslam.api",
+    "RangeRing": "glassslam.records",
     "RecordingInfo": "glassslam.records",
     "Relations": "glassslam.evaluation",
+    "SonarRing": "glassslam.records",
     "SourceOptions": "glassslam.sources",
     "Trajectory": "glassslam.records",
     "absolute_trajectory_error": "glassslam.evaluation",
@@ -81,11 +93,14 @@ __all__ = [
     "Mapper",
     "OccupancyMap",
     "Odometry",
+    "PointSet",
     "PoseGraph",
     "ProbabilityGrid",
     "Progress",
+    "RangeRing",
     "RecordingInfo",
     "Relations",
+    "SonarRing",
     "SourceOptions",
     "Trajectory",
     "absolute_trajectory_error",

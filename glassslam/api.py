@@ -1,16 +1,19 @@
 """A recording mapped in one call."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+import numpy as np
+
 from glassslam.config import Config
-from glassslam.records import LaserScan, RecordingInfo
+from glassslam.records import LaserScan, RangeRing, Record, RecordingInfo
 from glassslam.sources import SourceOptions, open_recording
 
 if TYPE_CHECKING:
+    from glassslam.fusion.listener import SonarListener
     from glassslam.slam.mapper import Mapper
     from glassslam.slam.result import MapResult
     from glassslam.sources import Recording
@@ -89,14 +92,18 @@ def map_recording(
     # The kernels are loaded only now: a recording that cannot be read is told at once.
     from glassslam.slam.mapper import Mapper  # noqa: PLC0415
 
-    mapper = Mapper(config or Config(), source.info.base_from_laser)
+    config = config or Config()
+    mapper = Mapper(config, source.info.base_from_laser)
+    sonar = _listener(source, config)
     reporter = _Reporter(progress, source.info)
     try:
-        _feed(mapper, source, reporter)
+        _feed(mapper, sonar, _filtered(source, config), reporter)
         reporter.tell("finishing")
-        result = mapper.finish(source.info)
+        result = mapper.finish(source.info, [sonar.glass] if sonar else [])
     finally:
         mapper.close()
+    if sonar:
+        result = sonar.joined(result)
     reporter.tell("done")
     result.statistics.messages_dropped.update(source.dropped)
     result.statistics.warnings[:0] = source.warnings
@@ -126,8 +133,34 @@ class _Reporter:
             self._callback(Progress(stage, self.scans, self._last - self._first, self._info))
 
 
-def _feed(mapper: "Mapper", source: "Recording", reporter: _Reporter) -> None:
-    for record in source.records():
+def _listener(source: "Recording", config: Config) -> "SonarListener | None":
+    """What collects the sonar of a recording; None where it has none."""
+    if source.info.sonar_ring is None:
+        return None
+    from glassslam.fusion.listener import SonarListener  # noqa: PLC0415  (only for recordings with sonar)
+
+    return SonarListener(source.info.sonar_ring, config.sonar)
+
+
+def _filtered(source: "Recording", config: Config) -> Iterator[Record]:
+    """The records, with the scans corrected by sonar where the configuration asks for it."""
+    ring = source.info.sonar_ring
+    if ring is None or not config.sonar.scan_filter.enabled:
+        return source.records()
+    from glassslam.fusion.filter_stream import filtered_records  # noqa: PLC0415
+
+    place = np.array(source.info.base_from_laser)
+    return filtered_records(source.records(), place, ring, config.sonar.scan_filter)
+
+
+def _feed(
+    mapper: "Mapper", sonar: "SonarListener | None", records: Iterator[Record], reporter: _Reporter
+) -> None:
+    for record in records:
+        if isinstance(record, RangeRing):
+            if sonar is not None:
+                sonar.add(record)
+            continue
         mapper.add(record)
         if isinstance(record, LaserScan):
             reporter.count(record)

@@ -193,7 +193,7 @@ class GlassConfig(Section):
     )
     """How panes are found in a scan; `auto` decides by the intensities and the resolution of the scans."""
     require_intensity: bool = False
-    """Whether a recording whose intensities tell nothing is an error; otherwise it is mapped without glass."""
+    """Whether a recording whose intensities tell nothing is an error; else it is mapped without glass."""
     scheme: Literal["off", "local", "global", "lite", "anchored"] = "anchored"
     """How glass stays in the map: not at all, locked in the submaps as Weerakoon et al. do it, or following
     the pose graph."""
@@ -267,9 +267,19 @@ class FusionConfig(Section):
     """How the sonar map joins the lidar map."""
 
     method: Literal[
-        "overlay", "attach", "pessimistic", "minmax", "lop", "liop", "iop", "bayes", "rsf_glass", "rsf_all"
-    ] = "rsf_all"
-    """Rule that joins the two maps; every rule is described in `glassslam.fusion`."""
+        "walls",
+        "overlay",
+        "attach",
+        "pessimistic",
+        "minmax",
+        "lop",
+        "liop",
+        "iop",
+        "bayes",
+        "rsf_glass",
+        "rsf_all",
+    ] = "walls"
+    """Rule that joins the two maps; every rule is described in `glassslam.fusion.fuse`."""
     occupied_threshold: Probability = 0.65
     """P(occupied) from which a cell stops a ray of `rsf_*` and is attached by `attach`."""
     glass_gap: Positive = 0.5

@@ -11,6 +11,7 @@ from glassslam.config import Config
 from glassslam.posegraph.graph import Constraint
 from glassslam.records import RecordingInfo, Trajectory
 from glassslam.slam.result import MapResult, OccupancyMap, RunStatistics, StageTime
+from glassslam.slam.trajectory import PoseTracks
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -43,13 +44,15 @@ def draw_map():
 @pytest.fixture
 def tiny_result() -> MapResult:
     """Two scans, one submap with two nodes, a map of 4 x 3 cells."""
+    grid = occupancy_map("####\n #..+\n ####\n".replace(" ", ""), origin=(-1.0, -0.5))
+    track = Trajectory(
+        np.array([1031745824.658, 1031745825.097833]), np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.1]])
+    )
     return MapResult(
-        map=occupancy_map("####\n #..+\n ####\n".replace(" ", ""), origin=(-1.0, -0.5)),
-        trajectory=Trajectory(
-            np.array([1031745824.658, 1031745825.097833]), np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.1]])
-        ),
-        node_stamps=np.array([1031745824.658, 1031745825.097833]),
-        node_poses=np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.1]]),
+        map=grid,
+        lidar_map=grid,
+        closed_map=None,
+        tracks=PoseTracks(track, track, track, track),
         submap_nodes=(0,),
         constraints=(
             Constraint(0, 1, np.array([0.3, 0.4, 0.1]), np.diag([2.0, 2.0, 4.0]), "odometry"),

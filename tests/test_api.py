@@ -43,7 +43,7 @@ def world(monkeypatch, tiny_result):
         def add(self, record):
             notes.records.append(record)
 
-        def finish(self, info=None):
+        def finish(self, info=None, glass_sources=()):
             notes.info = info
             return tiny_result
 

@@ -8,6 +8,7 @@ import numpy as np
 from detectors.calibration import Calibration
 from detectors.pane_lobe import SHOULDER, core, faces
 from detectors.panes import PaneProfile
+from glassslam.calibration.geometry import geometry_advice
 from glassslam.calibration.reading import Reading
 from glassslam.calibration.result import RecordingSummary
 
@@ -28,7 +29,7 @@ def advice(
     summaries: Sequence[RecordingSummary],
     panes: Sequence[PaneProfile],
 ) -> tuple[str, ...]:
-    """Warnings about a calibration: intensities, geometry, panes, and how sure the rates are.
+    """Warnings about a calibration: intensities, recordings, panes, sureness of the rates, beams.
 
     Parameters
     ----------
@@ -46,6 +47,7 @@ def advice(
         *_about_recordings(summaries),
         *_about_panes(panes),
         *_about_rates(calibration, any(summary.at_normal for summary in summaries)),
+        *geometry_advice(calibration.beam_errors),
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from detectors.beam_errors import BeamErrors
 from glassslam.calibration.straight_walls import WallPoints, wall_points
 from glassslam.records import FloatArray, LaserScan
 from glassslam.slam.beam_errors import true_bearings, true_points
@@ -17,46 +18,6 @@ _MEDIAN_TO_SIGMA = 1.4826
 _LEAST_SIGMA = 1e-4
 # what no lidar exceeds: holds errors at zero that the walls of a recording do not tell
 _PRIOR_SIGMA = np.array([0.05, 0.05, 0.05, 0.05])
-
-
-@dataclass(frozen=True, slots=True)
-class BeamErrors:
-    """What is wrong with the beams of a lidar, in its own frame, as `sensor.*` of the configuration takes it.
-
-    A beam announced at angle t with range r truly points to t + bearing_cosine * cos(t) +
-    bearing_sine * sin(t), starts `lateral_offset` to the left of the axis of rotation, and has the range
-    r + range_offset.
-
-    Attributes
-    ----------
-    bearing_cosine, bearing_sine : float
-        First harmonic of the bearing error, rad: the encoder disc turns off its centre.
-    lateral_offset : float
-        Distance by which beams pass the axis of rotation on the left, m: lidars that triangulate.
-    range_offset : float
-        What is missing from the ranges, m.
-    sigma : tuple of float
-        Standard deviations of the four, rad and m, from how much stretches of the recording disagree.
-    walls : int
-        Walls used; fewer than a hundred tell little.
-    bend_before, bend_after : float
-        Median distance of a wall's returns from a straight line without and with the correction, m.
-    """
-
-    bearing_cosine: float
-    bearing_sine: float
-    lateral_offset: float
-    range_offset: float
-    sigma: tuple[float, float, float, float]
-    walls: int
-    bend_before: float
-    bend_after: float
-
-    @property
-    def settings(self) -> dict[str, float]:
-        """The errors as values of the section `sensor` of the configuration."""
-        names = ("bearing_cosine", "bearing_sine", "lateral_offset", "range_offset")
-        return {name: getattr(self, name) for name in names}
 
 
 def estimate_beam_errors(

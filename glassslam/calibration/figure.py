@@ -112,6 +112,9 @@ def _draw_walls(axes: "Axes", result: CalibrationResult) -> None:
     square = samples.incidences < _NEARLY_NORMAL
     ranges, values = samples.ranges[square], samples.intensities[square]
     axes.set(title="surfaces against range", xlabel="range [m]", ylabel="intensity [unit of the sensor]")
+    if not result.has_curve:
+        _say(axes, "intensities tell nothing")
+        return
     farthest = max(float(np.percentile(ranges, 99.5)), calibration.diffuse.ranges[-1]) if ranges.size else 1.0
     near = ranges <= farthest
     _dots(axes, ranges[near], values[near], _WALL, name="flat surfaces, below 35 deg")
@@ -189,6 +192,8 @@ def _say(axes: "Axes", text: str) -> None:
 def _title(result: CalibrationResult) -> str:
     calibration = result.calibration
     day = f", {calibration.date}" if calibration.date else ""
+    if not result.has_curve:
+        return f"{calibration.sensor}{day}: beams only"
     text = f"{calibration.sensor}{day}: diffuse level at 1 m {calibration.intensity_scale:.0f}"
     rates = calibration.evidence.get(calibration.detector)
     if rates is None or not rates["detection"]["trials"]:

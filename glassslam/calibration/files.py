@@ -7,14 +7,11 @@ import yaml
 from detectors.calibration import Calibration
 from glassslam.calibration.result import CalibrationResult
 from glassslam.errors import ConfigError
+from glassslam.outputs.calibration_file import CALIBRATION_FILE, as_yaml
 from glassslam.outputs.directory import staged_directory
 
-FILES = ("calibration.yaml", "calibration.png")
+FILES = (CALIBRATION_FILE, "calibration.png")
 """What a calibration directory holds."""
-
-_HEAD = (
-    "# lidar calibration for glass, made by glassslam calibrate; use it with glassslam map --calibration\n"
-)
 
 
 def write_calibration(
@@ -50,14 +47,6 @@ def write_calibration(
         (folder / FILES[0]).write_text(as_yaml(result.calibration), encoding="utf-8")
         write_figure(result, folder / FILES[1])
     return [target / name for name in FILES]
-
-
-def as_yaml(calibration: Calibration) -> str:
-    """The calibration as it is written: lists of numbers on one line."""
-    plain = calibration.to_dict()
-    return _HEAD + yaml.safe_dump(
-        plain, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
-    )
 
 
 def read_calibration(path: str | Path) -> Calibration:

@@ -45,7 +45,7 @@ def mapped_views(
     reading : Reading
         Of a session with a file of panes.
     calibration : Calibration
-        With the diffuse curve; it finds the walls for the alignment.
+        With the diffuse curve, which finds the walls for the alignment, and the errors of the beams.
     options : SourceOptions, optional
         As the scans were read with.
     align : bool
@@ -65,7 +65,7 @@ def mapped_views(
     if not panes:
         raise CalibrationError(f"{path} holds no pane", "a recording without glass is of --material no-glass")
     truth = np.concatenate(panes)
-    config = _config(calibration if align else None)
+    config = _config(calibration, align=align)
     result = map_recording(reading.session.recording, config, source_options=options, progress=progress)
     poses = _poses(reading, result)
     if align:
@@ -143,11 +143,12 @@ def _plane(start: FloatArray, end: FloatArray) -> Plane | None:
     return Plane(normal, distance, (low, high)) if high - low > LEAST_LENGTH else None
 
 
-def _config(calibration: Calibration | None) -> Config:
+def _config(calibration: Calibration, *, align: bool) -> Config:
     glass: dict[str, Any] = {"detector": "off"}
-    if calibration is not None:
+    if align:
         glass = {"detector": "calibrated_peak", "calibration": calibration.to_dict()}
-    return Config.from_mapping({"glass": glass})
+    errors = calibration.beam_errors
+    return Config.from_mapping({"glass": glass, "sensor": errors.settings if errors else {}})
 
 
 def _poses(reading: Reading, result: MapResult) -> FloatArray:

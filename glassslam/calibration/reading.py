@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from detectors.detection import IntArray
 from detectors.informative import Verdict, is_intensity_informative
 from glassslam.calibration.session import Session
 from glassslam.errors import CalibrationError, NoScansError
+from glassslam.outputs.calibration_file import recording_day
 from glassslam.records import Float32Array, FloatArray, LaserScan, RecordingInfo
 from glassslam.slam.scan_check import defect, mended
 from glassslam.sources import SourceOptions, open_recording
@@ -18,8 +18,6 @@ from glassslam.sources import SourceOptions, open_recording
 MOST_SCANS = 150
 # a step between beams that varies by more than this share is no property of the sensor
 SAME_STEP = 0.02
-# stamps before this year were invented or count from the start of the robot
-_FIRST_YEAR = 1990
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +31,7 @@ class Reading:
     info : RecordingInfo
         As the source tells it.
     scans : tuple of LaserScan
-        At most 2 * 150 scans with intensities.
+        At most 2 * 150 scans with intensities; any scans where none has.
     numbers : ndarray of int64, shape (n,)
         Which of the usable scans of the recording they are.
     verdict : Verdict
@@ -53,6 +51,11 @@ class Reading:
         return min(steps), max(steps)
 
     @property
+    def has_levels(self) -> bool:
+        """Whether surfaces differ in intensity; those of a saturated lidar do at their dark end."""
+        return self.verdict.informative or self.verdict.kind == "saturated"
+
+    @property
     def no_echo(self) -> float | None:
         """Range written for beams without echo, m; None where it is not known or infinite."""
         value = self.info.no_echo
@@ -66,8 +69,6 @@ def read(session: Session, options: SourceOptions | None = None) -> Reading:
     ------
     RecordingError
         The recording cannot be read or has no scans.
-    CalibrationError
-        Its intensities tell nothing, and why.
     """
     source = open_recording(session.recording, options)
     kept: list[tuple[int, LaserScan]] = []
@@ -84,7 +85,10 @@ def read(session: Session, options: SourceOptions | None = None) -> Reading:
     if not kept:
         raise NoScansError(f"no usable laser scan in {session.name}")
     scans = [(number, scan) for number, scan in kept if len(scan.intensities) == len(scan.ranges)]
-    verdict = _verdict(session, [scan for _, scan in scans])
+    verdict = is_intensity_informative(
+        (scan.ranges, scan.intensities) for scan in spread([scan for _, scan in scans], 50)
+    )
+    scans = scans or kept
     return Reading(
         session,
         source.info,
@@ -94,14 +98,20 @@ def read(session: Session, options: SourceOptions | None = None) -> Reading:
     )
 
 
-def _verdict(session: Session, scans: list[LaserScan]) -> Verdict:
-    verdict = is_intensity_informative((scan.ranges, scan.intensities) for scan in spread(scans, 50))
-    # a saturated lidar still has a diffuse curve and a profile that says so; others have nothing
-    if not verdict.informative and verdict.kind != "saturated":
-        raise CalibrationError(
-            f"{session.name}: {verdict.reason}", "a lidar is calibrated for glass by its intensities"
-        )
-    return verdict
+def check_informative(readings: list[Reading]) -> None:
+    """Make sure that the intensities of recordings can be used.
+
+    Raises
+    ------
+    CalibrationError
+        Those of a recording tell nothing, and why.
+    """
+    for reading in readings:
+        if not reading.has_levels:
+            raise CalibrationError(
+                f"{reading.session.name}: {reading.verdict.reason}",
+                "a lidar is calibrated for glass by its intensities; without, --geometry can be calibrated",
+            )
 
 
 def spread(scans: list[LaserScan], most: int) -> list[LaserScan]:
@@ -138,12 +148,7 @@ def _turned(values: Float32Array, missing: int, seam: int) -> Float32Array:
 
 def day_of(readings: list[Reading]) -> str:
     """Day (UTC) on which the earliest of some recordings was made, ISO 8601; empty where it is not known."""
-    stamp = min(scan.stamp for reading in readings for scan in reading.scans)
-    try:
-        moment = datetime.fromtimestamp(stamp, UTC)
-    except (OverflowError, ValueError, OSError):
-        return ""
-    return moment.date().isoformat() if moment.year >= _FIRST_YEAR else ""
+    return recording_day(min(scan.stamp for reading in readings for scan in reading.scans))
 
 
 def check_alike(readings: list[Reading]) -> None:

@@ -70,3 +70,8 @@ class CalibrationResult:
     panes: tuple[PaneProfile, ...]
     surfaces: SurfaceSamples
     proven: bool
+
+    @property
+    def has_curve(self) -> bool:
+        """Whether the diffuse curve is one; without intensities there is none."""
+        return self.calibration.informative or self.surfaces.ranges.size > 0

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ _LEAST_SPAN = 0.35
 _TOLERANCE = 0.03
 _TOLERANCE_PER_RANGE = 0.01
 _LEAST_CHANGE = 0.02
+
+_Beams: TypeAlias = tuple[FloatArray, FloatArray]
+"""Angles and ranges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +65,7 @@ def wall_points(scans: Iterable[LaserScan], max_range: float, max_scans: int) ->
     max_scans : int
         Scans looked at, spread evenly over those that differ.
     """
-    chosen = list(_different(scans, max_range))
-    chosen = chosen[:: max(1, -(-len(chosen) // max_scans))]
+    chosen = _spread(_different(scans, max_range), max_scans)
     found = [wall for angles, ranges in chosen for wall in _walls(angles, ranges)]
     if not found:
         return WallPoints(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
@@ -73,7 +76,19 @@ def wall_points(scans: Iterable[LaserScan], max_range: float, max_scans: int) ->
     )
 
 
-def _different(scans: Iterable[LaserScan], max_range: float) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _spread(scans: Iterable[_Beams], most: int) -> list[_Beams]:
+    """At most so many scans, evenly spread; never more than twice as many are held."""
+    kept: list[_Beams] = []
+    stride = 1
+    for count, scan in enumerate(scans):
+        if count % stride == 0:
+            kept.append(scan)
+        if len(kept) > 2 * most:
+            kept, stride = kept[::2], 2 * stride
+    return kept[:: max(1, -(-len(kept) // most))]
+
+
+def _different(scans: Iterable[LaserScan], max_range: float) -> Iterator[_Beams]:
     """Angles and ranges of scans that were not taken where the one before was, NaN for unusable beams."""
     last: FloatArray | None = None
     for scan in scans:
@@ -89,7 +104,7 @@ def _different(scans: Iterable[LaserScan], max_range: float) -> Iterator[tuple[F
         yield scan.angle_min + scan.angle_increment * np.arange(len(ranges), dtype=np.float64), ranges
 
 
-def _walls(angles: FloatArray, ranges: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _walls(angles: FloatArray, ranges: FloatArray) -> Iterator[_Beams]:
     """Angles and ranges of the beams on each wall of one scan, the wall with most returns first."""
     usable = np.isfinite(ranges)
     angles, ranges = angles[usable], ranges[usable]
@@ -113,6 +128,8 @@ def _largest(points: FloatArray, tolerance: FloatArray) -> NDArray[np.bool_]:
     normals, offsets = _line_fit(windows)
     near = np.abs(normals @ points.T - offsets[:, None]) < tolerance
     best: NDArray[np.bool_] = near[np.argmax(near.sum(axis=1))]
+    if not best.any():
+        return best
     for _ in range(3):
         normal, offset = _line_fit(points[best].T[None])
         closer = np.abs(points @ normal[0] - offset[0]) < tolerance

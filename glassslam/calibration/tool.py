@@ -8,20 +8,23 @@ from typing import Any
 import numpy as np
 
 from detectors.calibration import Calibration
+from detectors.diffuse import DiffuseCurve
 from detectors.expectation import CalibrationScan
 from detectors.pane_lobe import faces
-from detectors.panes import PaneProfile
 from detectors.proposals import normalised_rates, propose
 from detectors.self_calibration import suggest_detector
 from glassslam.api import ProgressCallback
 from glassslam.calibration.advice import advice
+from glassslam.calibration.counts import answering_panes, evidence_of, summarised
+from glassslam.calibration.geometry import find_beam_errors, geometry_advice
 from glassslam.calibration.mapped import mapped_views
-from glassslam.calibration.reading import SAME_STEP, Reading, check_alike, day_of, read
-from glassslam.calibration.result import CalibrationResult, RecordingSummary
+from glassslam.calibration.reading import SAME_STEP, Reading, check_alike, check_informative, day_of, read
+from glassslam.calibration.result import CalibrationResult
 from glassslam.calibration.session import Session
-from glassslam.calibration.surfaces import final_curve, first_curve
+from glassslam.calibration.surfaces import final_curve, first_curve, joined
 from glassslam.calibration.views import View, faced_views, nearest_surface, plain_views, region, tolerance
 from glassslam.errors import CalibrationError, UsageError
+from glassslam.outputs.calibration_file import recording_name
 from glassslam.sources import SourceOptions
 
 Seen = list[tuple[Reading, list[View]]]
@@ -29,6 +32,8 @@ Seen = list[tuple[Reading, list[View]]]
 # an 8-bit lidar is saturated where its highest value comes again and again
 _SATURATED_SHARE = 1e-3
 _SATURATED_BEAMS = 20
+# stands where intensities say nothing
+_NO_CURVE = DiffuseCurve((1.0,), (1.0,))
 
 
 def calibrate(
@@ -37,6 +42,7 @@ def calibrate(
     name: str = "",
     options: SourceOptions | None = None,
     align: bool = False,
+    geometry: bool = False,
     progress: ProgressCallback | None = None,
 ) -> CalibrationResult:
     """Calibrate a lidar for glass.
@@ -54,6 +60,9 @@ def calibrate(
         Topics and the part of every recording to use.
     align : bool
         Move maps rigidly to where the glass found in them agrees best with the stated panes.
+    geometry : bool
+        Whether the errors of the beams are estimated as well. Recordings of which nothing is known then need
+        no intensities.
     progress : callable, optional
         Told of the mapping that stated panes need.
 
@@ -67,30 +76,52 @@ def calibrate(
     RecordingError
         A recording cannot be read.
     CalibrationError
-        Intensities tell nothing, recordings are of different lidars, or a stated surface is not there.
+        Intensities tell nothing, recordings are of different lidars, a stated surface is not there, or too
+        few walls are seen for the geometry.
     """
     if not sessions:
         raise UsageError("no recording to calibrate with")
     readings = [read(session, options) for session in sessions]
     check_alike(readings)
+    silent = not any(reading.has_levels or reading.session.material != "unknown" for reading in readings)
+    if not (geometry and silent):
+        check_informative(readings)
+    errors = find_beam_errors(sessions, options) if geometry else None
+    name = name or recording_name(readings[0].session.recording)
+    if silent:
+        return _geometry_alone(
+            _sensor(name, readings, Calibration("", _NO_CURVE, beam_errors=errors)), readings
+        )
     curve, samples = first_curve(readings)
-    start = _sensor(name or readings[0].session.recording.stem, readings, Calibration("", curve))
+    start = _sensor(name, readings, Calibration("", curve, beam_errors=errors))
     seen = [(reading, _views(reading, start, options, align, progress)) for reading in readings]
     curve, samples = final_curve(seen, curve, samples)
     scans = _scans(seen, curve)
     summaries = tuple(
-        _summary(reading, views, own) for (reading, views), own in zip(seen, scans, strict=True)
+        summarised(reading, views, own) for (reading, views), own in zip(seen, scans, strict=True)
     )
     sensor = replace(
         start,
         diffuse=curve,
-        evidence=_evidence(summaries, readings, int(samples.ranges.size)),
+        evidence=evidence_of(summaries, readings, int(samples.ranges.size)),
     )
     result, proven = _complete(sensor, [scan for own in scans for scan in own])
-    panes = _panes(scans)
+    panes = answering_panes(scans)
     return CalibrationResult(
         result, summaries, advice(result, readings, summaries, panes), panes, samples, proven
     )
+
+
+def _geometry_alone(sensor: Calibration, readings: list[Reading]) -> CalibrationResult:
+    """The calibration of a lidar without intensities: its beams, and that glass cannot be looked for."""
+    seen = [plain_views(reading) for reading in readings]
+    summaries = tuple(summarised(reading, views, []) for reading, views in zip(readings, seen, strict=True))
+    warnings = [
+        *(f"{one.session.name}: {one.verdict.reason}; glass cannot be told by them" for one in readings),
+        *geometry_advice(sensor.beam_errors),
+    ]
+    made = replace(sensor, evidence=evidence_of(summaries, readings, 0))
+    return CalibrationResult(made, summaries, tuple(warnings), (), joined([]), proven=False)
 
 
 def _sensor(name: str, readings: list[Reading], blank: Calibration) -> Calibration:
@@ -191,42 +222,3 @@ def _complete(sensor: Calibration, scans: list[CalibrationScan]) -> tuple[Calibr
         rates = normalised_rates(sensor, scans)
     note = "no pane was seen at normal incidence: faint, weakest_decay and pane are those of another sensor"
     return replace(sensor, evidence={**sensor.evidence, **rates, "notes": [note]}), False
-
-
-def _summary(reading: Reading, views: list[View], scans: list[CalibrationScan]) -> RecordingSummary:
-    session = reading.session
-    distances = [plane.distance for view in views for plane in view.planes]
-    if session.has_pane:
-        distances = [pane.distance for scan in scans for pane in scan.panes if pane.answered.any()]
-    return RecordingSummary(
-        session.name,
-        session.material,
-        session.distance,
-        len(views),
-        _with_surface(session, views, scans),
-        sum(faces(pane) for scan in scans for pane in scan.panes),
-        len({view.place for view in views}),
-        round(float(np.median(distances)), 3) if distances else None,
-    )
-
-
-def _with_surface(session: Session, views: list[View], scans: list[CalibrationScan]) -> int:
-    if session.has_pane:
-        return sum(any(pane.answered.any() for pane in scan.panes) for scan in scans)
-    return sum(bool(view.planes) for view in views)
-
-
-def _panes(scans: list[list[CalibrationScan]]) -> tuple[PaneProfile, ...]:
-    every = (pane for own in scans for scan in own for pane in scan.panes)
-    return tuple(pane for pane in every if pane.answered.any())
-
-
-def _evidence(
-    summaries: Sequence[RecordingSummary], readings: list[Reading], surface_beams: int
-) -> dict[str, Any]:
-    return {
-        "recordings": [summary.recording for summary in summaries],
-        "sessions": [summary.to_dict() for summary in summaries],
-        "scans": sum(len(reading.scans) for reading in readings),
-        "surface_beams": surface_beams,
-    }

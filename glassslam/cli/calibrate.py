@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from glassslam.calibration import CalibrationResult
 
 EXAMPLES = """\
@@ -17,6 +15,7 @@ EXAMPLES = """\
   glassslam calibrate w1.bag w2.bag --material matte --distance 0.5 --distance 1
   glassslam calibrate run.bag                                    walls only, no known pane
   glassslam calibrate pane.bag office.bag --distance 1 --distance - --material glass --material no-glass
+  glassslam calibrate run.bag --geometry                         the map bends: correct the beams as well
   glassslam map run.bag --calibration one-calibration            use it
 """
 
@@ -61,6 +60,13 @@ Rois = Annotated[
 Align = Annotated[
     bool, typer.Option("--align", help="Lay the map onto the panes first, for panes in another frame.")
 ]
+Geometry = Annotated[
+    bool,
+    typer.Option(
+        "--geometry",
+        help="Estimate the errors of the beams as well, from walls that come out bent; for maps that bend.",
+    ),
+]
 Name = Annotated[
     str, typer.Option("--name", metavar="NAME", help="Name of the sensor [default: of the first recording].")
 ]
@@ -85,6 +91,7 @@ def calibrate_command(
     panes: PaneFiles = None,
     roi: Rois = None,
     align: Align = False,
+    geometry: Geometry = False,
     name: Name = "",
     output: Output = None,
     overwrite: Overwrite = False,
@@ -118,7 +125,7 @@ def calibrate_command(
     check_directory(directory, overwrite=overwrite, files=FILES)
     options = SourceOptions(scan_topic=scan_topic, start=start, duration=duration)
     with progress_bar(quiet=quiet) as progress:
-        result = run(sessions, name=name, options=options, align=align, progress=progress)
+        result = run(sessions, name=name, options=options, align=align, geometry=geometry, progress=progress)
     written = write_calibration(result, directory, overwrite=overwrite)
     if json:
         _print_json(result, directory)
@@ -152,96 +159,14 @@ def _finite(value: Any) -> Any:
 
 
 def _show(result: "CalibrationResult", written: list[Path]) -> None:
+    from glassslam.cli.calibrate_tables import recordings_table, values_table  # noqa: PLC0415  (loads rich)
     from glassslam.cli.terminal import emit_rich  # noqa: PLC0415
 
     emit_rich(
-        _recordings_table(result),
+        recordings_table(result),
         "",
-        _values_table(result),
+        values_table(result),
         "",
         *(f"warning: {text}" for text in result.warnings),
         *(f"wrote {path}" for path in written),
     )
-
-
-def _recordings_table(result: "CalibrationResult") -> "Table":
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    table.add_column("recording", overflow="fold")
-    table.add_column("material")
-    for heading in ("stated", "found", "scans", "seen", "square", "places"):
-        table.add_column(heading, justify="right")
-    for row in result.recordings:
-        faced = row.material not in ("no-glass", "unknown")
-        table.add_row(
-            row.recording,
-            row.material,
-            "-" if row.distance is None else f"{row.distance:g} m",
-            "-" if row.measured is None else f"{row.measured:.2f} m",
-            str(row.scans),
-            str(row.with_surface) if faced else "-",
-            str(row.at_normal) if faced and row.material != "matte" else "-",
-            str(row.places),
-        )
-    return table
-
-
-def _values_table(result: "CalibrationResult") -> "Table":
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
-    for name, value in value_rows(result):
-        table.add_row(name, value)
-    return table
-
-
-def value_rows(result: "CalibrationResult") -> list[tuple[str, str]]:
-    """Lines of the summary as pairs of name and value."""
-    from math import degrees  # noqa: PLC0415
-
-    own = result.calibration
-    curve, pane = own.diffuse, own.pane
-    unproven = "" if result.proven else " (unproven)"
-    step = f"{degrees(own.angle_increment):.4g} deg" if own.angle_increment else "varying"
-    rows = [
-        ("sensor", f"{own.sensor}, {own.beams or 'varying'} beams, step {step}, {own.date or 'no date'}"),
-        ("limits", f"{own.range_min:g} to {own.range_max:g} m, no echo: {_silent(own.no_echo)}"),
-        (
-            "diffuse level",
-            f"{own.intensity_scale:.0f} at 1 m, from {curve.ranges[0]:g} to {curve.ranges[-1]:g} m,"
-            f" spread {curve.spread:.0%}",
-        ),
-        ("detector", own.detector),
-    ]
-    if own.thresh:
-        rows.append(("intensity_peak", f"thresh {own.thresh:g}, grad {own.grad:g}, width {own.width} beams"))
-    shape = f"faint below {own.faint:g}, decay above {own.weakest_decay:g} per rad"
-    rows.append(("calibrated_peak", shape + unproven))
-    if result.proven:
-        rows.append(("pane", f"haze {pane.haze:g}, decay {pane.decay:g} per rad, mirror peak {pane.peak:g}"))
-    names = ("intensity_peak", "calibrated_peak", "narrow_return")
-    rows += [(f"{name} rates", _rates(own.evidence[name])) for name in names if name in own.evidence]
-    return rows + (_reach_rows(own.evidence[own.detector]) if own.detector in own.evidence else [])
-
-
-def _reach_rows(rates: dict[str, Any]) -> list[tuple[str, str]]:
-    return [(f"up to {rate['to']:g} m", f"panes {_rate(rate)}") for rate in rates.get("by_distance", ())]
-
-
-def _silent(no_echo: float | None) -> str:
-    return "infinite or not seen" if no_echo is None else f"{no_echo:g} m"
-
-
-def _rates(rates: dict[str, Any]) -> str:
-    found, alarm = (_rate(rates[name]) for name in ("detection", "false_alarm"))
-    return f"panes {found}; scans with a false alarm {alarm}"
-
-
-def _rate(rate: dict[str, Any]) -> str:
-    if not rate["trials"]:
-        return "not tried"
-    counts = f"{rate['successes']} of {rate['trials']}"
-    return f"{counts} = {rate['value']:.1%} ({rate['low']:.0%} to {rate['high']:.0%})"

@@ -10,6 +10,7 @@ EXAMPLES = """\
   glassslam map run.bag -o office --overwrite       replace earlier results
   glassslam map run.bag --sensor ust10lx            find glass walls as well
   glassslam map run.bag --calibration mine/         the same with a lidar calibrated before
+  glassslam map run.bag --require-intensity         fail where intensities cannot show glass
   glassslam map run.bag --sonar sonar.txt           take sonar from a second file
   glassslam map part1.bag part2.bag -o office       recordings that follow each other
   glassslam map run.mcap --scan-topic /front/scan   choose among several lidars
@@ -53,6 +54,13 @@ CalibrationFile = Annotated[
         help="Look for glass with the calibration of this lidar; see calibrate.",
     ),
 ]
+RequireIntensity = Annotated[
+    bool,
+    typer.Option(
+        "--require-intensity",
+        help="Fail where the intensities of the recording tell nothing, rather than map without glass.",
+    ),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in DIR.")]
 ScanTopic = Annotated[str | None, typer.Option(help="Topic of the laser scans.", metavar="TOPIC")]
 OdomTopic = Annotated[str | None, typer.Option(help="Topic of the odometry; tf, or none.", metavar="TOPIC")]
@@ -94,6 +102,7 @@ def map_command(
     assignments: Assignments = None,
     sensor: Sensor = None,
     calibration: CalibrationFile = None,
+    require_intensity: RequireIntensity = False,
     overwrite: Overwrite = False,
     scan_topic: ScanTopic = None,
     odom_topic: OdomTopic = None,
@@ -119,7 +128,9 @@ def map_command(
     stopwatch = Stopwatch()
     from glassslam.cli.settings import (  # noqa: PLC0415
         calibration_assignments,
+        check_intensity_use,
         default_directory,
+        intensity_assignments,
         parse_pose,
         resolve_config,
         sensor_assignments,
@@ -133,11 +144,13 @@ def map_command(
             config,
             [
                 *sensor_assignments(sensor),
-                *calibration_assignments(calibration, sensor),
+                *calibration_assignments(calibration, sensor, config),
+                *intensity_assignments(required=require_intensity),
                 *(assignments or ()),
             ],
         ),
     )
+    check_intensity_use(resolved)
     from glassslam.sources import SourceOptions  # noqa: PLC0415  (loads rosbags)
 
     options = SourceOptions(

@@ -56,15 +56,26 @@ def sensor_assignments(sensor: str | None) -> list[str]:
     return ["glass.detector=calibrated_peak", f"glass.sensor={sensor}"]
 
 
-def calibration_assignments(file: Path | None, sensor: str | None) -> list[str]:
+def calibration_assignments(file: Path | None, sensor: str | None, config: Path | None = None) -> list[str]:
     """Assignments that look for glass with a calibration, which becomes part of the configuration.
+
+    The errors of the beams go to the section `sensor`, apart from those that a file of parameters sets.
+
+    Parameters
+    ----------
+    file : Path or None
+        A calibration or its directory; None for no assignments.
+    sensor : str or None
+        Kind of lidar that is named besides.
+    config : Path or None
+        The file of parameters.
 
     Raises
     ------
     UsageError
         A kind of lidar is named as well.
     ConfigError
-        The file is no calibration, or an entry of it is wrong.
+        The file is no calibration, or an entry of it is wrong; or the file of parameters is refused.
     """
     if file is None:
         return []
@@ -77,16 +88,55 @@ def calibration_assignments(file: Path | None, sensor: str | None) -> list[str]:
     plain = {"thresh": calibration.thresh, "grad": calibration.grad, "width": calibration.width}
     if all(plain.values()):
         values |= plain
-    return [f"glass.{name}={_on_one_line(value)}" for name, value in values.items()]
+    stated = Config.load(config).sensor.model_fields_set if config else set()
+    errors = calibration.beam_errors.settings if calibration.beam_errors else {}
+    return [
+        *(f"glass.{name}={_on_one_line(value)}" for name, value in values.items()),
+        *(f"sensor.{name}={_on_one_line(value)}" for name, value in errors.items() if name not in stated),
+    ]
 
 
 def calibration_warnings(config: Config) -> list[str]:
-    """That a calibration was given but rules out that glass is seen; empty otherwise."""
-    glass = config.glass
-    if glass.calibration is None or glass.detector != "off" or glass.calibration["detector"] != "off":
+    """That a calibration rules out that glass is seen, or that the beams are corrected in another way."""
+    calibration = config.glass.calibration
+    if calibration is None:
         return []
-    name = glass.calibration["sensor"]
-    return [f"glass is not looked for: by its calibration the intensities of {name} cannot show it"]
+    warnings = []
+    if config.glass.detector == calibration["detector"] == "off":
+        name = calibration["sensor"]
+        warnings.append(
+            f"glass is not looked for: by its calibration the intensities of {name} cannot show it"
+        )
+    if others := _other_beams(config, calibration["beam_errors"] or {}):
+        warnings.append(f"the beams are not corrected as calibrated: {', '.join(others)}")
+    return warnings
+
+
+def _other_beams(config: Config, errors: dict[str, Any]) -> list[str]:
+    used = config.sensor.model_dump()
+    pairs = [(name, used[name], value) for name, value in errors.items() if name in used]
+    return [f"sensor.{name} is {mine:g}, not {its:g}" for name, mine, its in pairs if mine != its]
+
+
+def intensity_assignments(*, required: bool) -> list[str]:
+    """Assignments that make intensities which tell nothing an error; none unless it is asked for."""
+    return ["glass.require_intensity=true"] if required else []
+
+
+def check_intensity_use(config: Config) -> None:
+    """Make sure that intensities are not required by a run that does not look at them.
+
+    Raises
+    ------
+    UsageError
+        They are.
+    """
+    glass = config.glass
+    if glass.require_intensity and glass.detector in ("off", "narrow_return"):
+        raise UsageError(
+            f"--require-intensity: the detector {glass.detector} uses no intensities",
+            "leave one of them out, or choose another detector",
+        )
 
 
 def _on_one_line(value: Any) -> str:
@@ -133,7 +183,6 @@ def parse_pose(text: str | None) -> tuple[float, float, float] | None:
 
 def default_directory(recordings: Sequence[Path], kind: str = "map") -> Path:
     """Name of the results directory when none is given: NAME-map in the working directory."""
-    name = recordings[0].resolve().name
-    for suffix in (".gz", ".bag", ".mcap", ".db3", ".clf", ".log"):
-        name = name.removesuffix(suffix) or name
-    return Path(f"{name}-{kind}")
+    from glassslam.outputs.calibration_file import recording_name  # noqa: PLC0415  (loads numpy)
+
+    return Path(f"{recording_name(recordings[0])}-{kind}")

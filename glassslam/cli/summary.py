@@ -40,6 +40,7 @@ def summary_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
         ("graph", f"{report['nodes']} nodes, {report['submaps']} submaps"),
         ("loop closures", f"{closures['accepted']} of {closures['tried']} tried{_rejected(closures)}"),
     ]
+    rows.append(("glass", _glass(report["glass"])))
     rows += [("residual", f"{name} {value:.4g}") for name, value in _numbers(report["residuals"])]
     rows += [
         ("time", f"{name} {stage['wall']:.2f} s ({stage['cpu']:.2f} s CPU)")
@@ -50,6 +51,15 @@ def summary_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append(("total", f"{wall:.2f} s ({cpu:.2f} s CPU), {speed(report['recording_seconds'], wall)}"))
         rows.append(("peak memory", f"{resources['peak_memory_mb']:.0f} MB"))
     return rows + [("warning", text) for text in report["warnings"]]
+
+
+def _glass(glass: dict[str, Any]) -> str:
+    why = f" ({glass['reason']})" if glass["reason"] else ""
+    if "walls" not in glass:
+        return f"not looked for{why}"
+    walls = f"{glass['walls']} wall{'s' * (glass['walls'] != 1)} of {glass['wall_length_m']:.1f} m"
+    seen_by = "sonar" if glass["detector"] == "off" else glass["detector"]
+    return f"{walls}, {glass['observations']} observations by {seen_by}{why}"
 
 
 def _numbers(values: dict[str, float | None]) -> list[tuple[str, float]]:

@@ -40,7 +40,8 @@ def emit_rich(*parts: "RenderableType") -> None:
     console = Console(markup=False, highlight=False, emoji=False)
     with console.capture() as capture:
         for part in parts:
-            console.print(part)
+            # a path or a warning that is cut in two can neither be copied nor searched for
+            console.print(part, soft_wrap=isinstance(part, str))
     emit(capture.get())
 
 

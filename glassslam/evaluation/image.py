@@ -1,25 +1,27 @@
 """How much a map looks like the true map: the image metrics of pi-map, and the overlap of its classes."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.errors import EvaluationError
 from glassslam.evaluation.image_alignment import Outline, best_motions
-from glassslam.geometry import inverse, transform_points
-from glassslam.outputs.map_server import FREE, FREE_THRESH, OCCUPIED, OCCUPIED_THRESH, UNKNOWN
+from glassslam.evaluation.image_cells import (
+    NO_CLASS,
+    OPEN,
+    PANE,
+    SOLID,
+    Mask,
+    classes_of,
+    cut_out,
+    drawn_anew,
+    region_of,
+)
+from glassslam.outputs.map_server import FREE, OCCUPIED, OCCUPIED_THRESH, UNKNOWN
 from glassslam.records import FloatArray
 from glassslam.slam.result import OccupancyMap
 
-Mask: TypeAlias = NDArray[np.bool_]
-Classes: TypeAlias = NDArray[np.uint8]
-
-MARGIN = 1.0
-"""How far the compared region reaches beyond what the truth knows, m."""
-
-_UNKNOWN, _FREE, _SOLID, _GLASS = range(4)
 _GREY = np.array([UNKNOWN, FREE, OCCUPIED, OCCUPIED], dtype=np.uint8)
 _SSIM_WINDOW = 7
 
@@ -104,19 +106,19 @@ def evaluate_image(
     >>> errors.mse, round(errors.ssim, 9), round(errors.ncc, 9)
     (0.0, 1.0, 1.0)
     """
-    classes, true_classes = _classes(grid, glass, "the map"), _classes(truth, true_glass, "the truth")
+    classes, true_classes = classes_of(grid, glass, "the map"), classes_of(truth, true_glass, "the truth")
     motion = np.array(map_from_truth or align_maps(grid, truth, seed=seed), dtype=np.float64)
-    low, shape = _region(grid, truth, true_classes, motion)
-    mine = _cut(classes, grid, low, shape)
-    true = _drawn(true_classes, truth, motion, grid, low, shape)
+    low, shape = region_of(grid, truth, true_classes, motion)
+    mine = cut_out(classes, grid, low, shape)
+    true = drawn_anew(true_classes, truth, motion, grid, low, shape)
     if min(shape) < _SSIM_WINDOW:
         raise EvaluationError(f"the truth covers {shape[1]} x {shape[0]} cells", "SSIM needs 7 x 7 cells")
     return ImageErrors(
         **_image_metrics(_GREY[mine], _GREY[true]),
-        iou_occupied=_iou(mine >= _SOLID, true >= _SOLID),
-        iou_free=_iou(mine == _FREE, true == _FREE),
-        iou_unknown=_iou(mine == _UNKNOWN, true == _UNKNOWN),
-        iou_glass=None if glass is None or true_glass is None else _iou(mine == _GLASS, true == _GLASS),
+        iou_occupied=_iou(mine >= SOLID, true >= SOLID),
+        iou_free=_iou(mine == OPEN, true == OPEN),
+        iou_unknown=_iou(mine == NO_CLASS, true == NO_CLASS),
+        iou_glass=None if glass is None or true_glass is None else _iou(mine == PANE, true == PANE),
         rows=shape[0],
         columns=shape[1],
         resolution=grid.resolution,
@@ -143,16 +145,16 @@ def align_maps(grid: OccupancyMap, truth: OccupancyMap, *, seed: int = 0) -> tup
 
 def agreement(grid: OccupancyMap, truth: OccupancyMap, map_from_truth: FloatArray) -> float:
     """Overlap of what is free plus overlap of what is occupied, between 0 and 2, on the cells of the map."""
-    classes = _classes(grid, None, "the map")
-    true = _drawn(
-        _classes(truth, None, "the truth"),
+    classes = classes_of(grid, None, "the map")
+    true = drawn_anew(
+        classes_of(truth, None, "the truth"),
         truth,
         map_from_truth,
         grid,
         np.zeros(2, dtype=np.int64),
         classes.shape,
     )
-    shares = [_iou(classes == kind, true == kind) or 0.0 for kind in (_FREE, _SOLID)]
+    shares = [_iou(classes == kind, true == kind) or 0.0 for kind in (OPEN, SOLID)]
     return sum(shares)
 
 
@@ -192,72 +194,11 @@ def _image_metrics(mine: NDArray[np.uint8], true: NDArray[np.uint8]) -> dict[str
     }
 
 
-def _classes(grid: OccupancyMap, glass: Mask | None, name: str) -> Classes:
-    classes = np.zeros(grid.probability.shape, dtype=np.uint8)
-    classes[grid.probability < FREE_THRESH] = _FREE
-    classes[grid.probability > OCCUPIED_THRESH] = _SOLID
-    if glass is not None:
-        if glass.shape != classes.shape:
-            raise EvaluationError(f"{name} has {classes.shape} cells, its classes have {glass.shape}")
-        classes[glass & (classes == _SOLID)] = _GLASS
-    return classes
-
-
 def _outline(grid: OccupancyMap, name: str) -> Outline:
     occupied = grid.probability > OCCUPIED_THRESH
     if not occupied.any():
         raise EvaluationError(f"{name} has no occupied cell", "there is nothing to align")
     return Outline.of(occupied, grid.origin, grid.resolution)
-
-
-def _region(
-    grid: OccupancyMap, truth: OccupancyMap, true_classes: Classes, motion: FloatArray
-) -> tuple[NDArray[np.int64], tuple[int, int]]:
-    """First cell (column, row) and shape of what is compared, in cells of the map."""
-    rows, columns = np.nonzero(true_classes)
-    if rows.size == 0:
-        raise EvaluationError("the truth knows no cell", "is it the right file?")
-    centres = np.asarray(truth.origin) + (np.stack((columns, rows), axis=1) + 0.5) * truth.resolution
-    moved = (transform_points(motion, centres) - np.asarray(grid.origin)) / grid.resolution
-    margin = MARGIN / grid.resolution
-    low = np.floor(moved.min(axis=0) - margin).astype(np.int64)
-    high = np.ceil(moved.max(axis=0) + margin).astype(np.int64)
-    return low, (int(high[1] - low[1]), int(high[0] - low[0]))
-
-
-def _cut(classes: Classes, grid: OccupancyMap, low: NDArray[np.int64], shape: tuple[int, int]) -> Classes:
-    out = np.zeros(shape, dtype=np.uint8)
-    rows, columns = grid.probability.shape
-    top, left = max(0, -int(low[1])), max(0, -int(low[0]))
-    part = classes[max(0, int(low[1])) : max(0, min(rows, int(low[1]) + shape[0])),
-                   max(0, int(low[0])) : max(0, min(columns, int(low[0]) + shape[1]))]  # fmt: skip
-    out[top : top + part.shape[0], left : left + part.shape[1]] = part[: shape[0] - top, : shape[1] - left]
-    return out
-
-
-def _drawn(
-    true_classes: Classes,
-    truth: OccupancyMap,
-    motion: FloatArray,
-    grid: OccupancyMap,
-    low: NDArray[np.int64],
-    shape: tuple[int, int],
-) -> Classes:
-    """The truth in cells of the map; of the finer cells within one, the occupied win, then the free."""
-    finer = max(1, round(grid.resolution / truth.resolution))
-    truth_from_map = inverse(motion)
-    out = np.zeros(shape, dtype=np.uint8)
-    for step in np.ndindex(finer, finer):
-        within = (np.array(step) + 0.5) / finer
-        columns, rows = np.meshgrid(np.arange(shape[1]) + within[0], np.arange(shape[0]) + within[1])
-        places = np.stack((columns.ravel() + low[0], rows.ravel() + low[1]), axis=1) * grid.resolution
-        cells = transform_points(truth_from_map, places + np.asarray(grid.origin)) - np.asarray(truth.origin)
-        index = np.floor(cells / truth.resolution + 1e-9).astype(np.int64)
-        inside = (index >= 0).all(axis=1) & (index < np.array(true_classes.shape)[::-1]).all(axis=1)
-        found = np.zeros(len(index), dtype=np.uint8)
-        found[inside] = true_classes[index[inside, 1], index[inside, 0]]
-        out = np.maximum(out, found.reshape(shape))
-    return out
 
 
 def _iou(a: Mask, b: Mask) -> float | None:

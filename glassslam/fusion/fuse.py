@@ -1,5 +1,6 @@
 """Every rule that joins a lidar map and a sonar map, by name.
 
+walls        glass walls fitted to what lidar and sonar say together; needs the run, see `fusion.listener`
 overlay      end points of the sonars as a second layer (Zhang et al., approach B)
 attach       occupied cells of the sonar map attached to the lidar map (pi-map, basic fusion)
 pessimistic  the sensor that says occupied most (study of the Gates building)
@@ -26,8 +27,10 @@ from glassslam.records import FloatArray
 from glassslam.slam.result import OccupancyMap
 from glassslam.sonar.sweeps import SonarSweeps
 
-METHODS: tuple[str, ...] = get_args(FusionConfig.model_fields["method"].annotation)
-"""Names of the rules."""
+METHODS: tuple[str, ...] = tuple(
+    name for name in get_args(FusionConfig.model_fields["method"].annotation) if name != "walls"
+)
+"""Names of the rules that join two finished maps."""
 
 _NEED_SWEEPS = ("overlay", "rsf_glass", "rsf_all")
 _Decision: TypeAlias = tuple[NDArray[np.floating], NDArray[np.uint8] | None]

@@ -23,15 +23,18 @@ def count_along_line(
     tolerance: float,
     beyond: float,
     normal_limit: float,
+    before: float,
     solid: NDArray[np.int64],
     passed: NDArray[np.int64],
     passed_normal: NDArray[np.int64],
+    blocked: NDArray[np.int64],
 ) -> None:
     """Count returns on a line and beams through it, by pieces of length `step` from `start` on.
 
     Points `first[n]` .. `first[n + 1]` are those of node n, in the frame of its base. A return within
     `tolerance` of the line counts as solid; a beam that ends `beyond` it counts as passed where it
-    crosses, and also as passed at normal incidence when its angle to the normal is below `normal_limit`.
+    crosses, and also as passed at normal incidence when its angle to the normal is below `normal_limit`; one
+    that ends at most `before` in front of it counts as blocked where it would have crossed.
     """
     bins = solid.shape[0]
     nx, ny = -direction[1], direction[0]
@@ -53,11 +56,18 @@ def count_along_line(
                 if 0 <= b < bins:
                     solid[b] += 1
                 continue
-            if gap * side >= 0.0 or abs(gap) < beyond:
+            crosses = gap * side < 0.0
+            if abs(gap) > before if not crosses else abs(gap) < beyond:
+                continue
+            if not crosses and abs(side) <= abs(gap):
                 continue
             share = side / (side - gap)
             b = math.floor((along_sensor + share * (along - along_sensor) - start) / step)
-            if 0 <= b < bins:
+            if not 0 <= b < bins:
+                continue
+            if not crosses:
+                blocked[b] += 1
+            else:
                 passed[b] += 1
                 if abs(along - along_sensor) < math.tan(normal_limit) * abs(gap - side):
                     passed_normal[b] += 1

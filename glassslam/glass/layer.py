@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from glassslam.records import Float32Array, FloatArray
 
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
+    from detectors.calibration import Calibration
     from glassslam.glass.beam_labels import GlassBeams
     from glassslam.glass.ghosts import Ghosts
     from glassslam.glass.observations import GlassObservations
@@ -45,6 +46,8 @@ class GlassLayer:
         Which returns came from behind the walls.
     ghost_cells : ndarray of float64, shape (g, 2)
         Centres of the cells of the map in which nothing but ghosts ends, m.
+    calibration : Calibration or None
+        What the run has learnt about its lidar by itself.
     """
 
     walls: "tuple[GlassWall, ...]"
@@ -55,6 +58,7 @@ class GlassLayer:
     beams: "GlassBeams | None" = None
     ghosts: "Ghosts | None" = None
     ghost_cells: FloatArray = field(default_factory=_no_cells)
+    calibration: "Calibration | None" = None
 
 
 def wall_cells(

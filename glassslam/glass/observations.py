@@ -5,13 +5,18 @@ place follows the graph: after every optimisation it is asked for anew. Stored g
 stale with the next loop closure, which Weerakoon et al. call an unsolved problem.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.geometry import wrap_angle
 from glassslam.records import FloatArray
+
+LIDAR: Final = 0
+SONAR: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +41,8 @@ class GlassObservations:
         Standard deviations along the normal, m, and of the normal, rad.
     extent : ndarray of float64, shape (k,)
         Half width of the surface piece the observation proves, m.
+    sensor_kind : ndarray of uint8, shape (k,)
+        LIDAR or SONAR.
     """
 
     node: NDArray[np.int64]
@@ -47,6 +54,7 @@ class GlassObservations:
     position_sigma: FloatArray
     normal_sigma: FloatArray
     extent: FloatArray
+    sensor_kind: NDArray[np.uint8]
 
     def __len__(self) -> int:
         return len(self.node)
@@ -56,8 +64,22 @@ class GlassObservations:
         """No observations."""
         none = np.empty(0)
         return cls(
-            np.empty(0, np.int64), np.empty((0, 2)), none, np.empty((0, 2)), none, none, none, none, none
-        )
+            np.empty(0, np.int64), np.empty((0, 2)), none, np.empty((0, 2)), none, none, none, none, none,
+            np.empty(0, np.uint8),
+        )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: "Sequence[GlassObservations]") -> "GlassObservations":
+        """Observations of several sensors as one set, each with its own uncertainty, for one fit of walls.
+
+        Parameters
+        ----------
+        parts : sequence of GlassObservations
+            Observations bound to the same nodes.
+        """
+        columns = [field.name for field in fields(cls)]
+        everything = (cls.empty(), *parts)
+        return cls(**{name: np.concatenate([getattr(part, name) for part in everything]) for name in columns})
 
     def at(self, node_poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Positions (k, 2), m, and normals (k,), rad, in the map frame for node poses (n, 3)."""

@@ -1,5 +1,7 @@
 """Where along a line glass stands, by the observations on it and the beams through it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,24 +14,50 @@ _RELIABLE = 0.3
 _SOLID_RETURNS = 3
 
 
-def glass_stretches(
-    seen: NDArray[np.int64],
-    solid: NDArray[np.int64],
-    passed: NDArray[np.int64],
-    passed_normal: NDArray[np.int64],
-    gone: NDArray[np.bool_],
-    config: GlassWallConfig,
-) -> NDArray[np.bool_]:
+@dataclass(frozen=True, slots=True)
+class LineEvidence:
+    """What a run tells about a line, by pieces of `STEP`.
+
+    Attributes
+    ----------
+    seen : ndarray of int64, shape (b,)
+        Observations of glass; at least one piece has some.
+    answers : ndarray of int64, shape (b,)
+        Those of them that the lidar made.
+    solid, passed, passed_normal : ndarray of int64, shape (b,)
+        Returns on the line, beams through it, and beams through it at normal incidence.
+    blocked : ndarray of int64, shape (b,)
+        Returns from things just before the line.
+    gone : ndarray of bool, shape (b,)
+        Pieces that were glass once and are open now.
+    """
+
+    seen: NDArray[np.int64]
+    answers: NDArray[np.int64]
+    solid: NDArray[np.int64]
+    passed: NDArray[np.int64]
+    passed_normal: NDArray[np.int64]
+    blocked: NDArray[np.int64]
+    gone: NDArray[np.bool_]
+
+    @property
+    def opaque(self) -> NDArray[np.bool_]:
+        """Pieces that stop beams and are not observed as glass."""
+        return np.asarray((self.seen == 0) & (self.solid >= _SOLID_RETURNS) & (self.solid > self.passed))
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """Pieces that most beams do not reach: nothing looked there, or something stands before them."""
+        return np.asarray(~self.opaque & (self.blocked >= self.passed))
+
+
+def glass_stretches(line: LineEvidence, config: GlassWallConfig) -> NDArray[np.bool_]:
     """Pieces of a line that are glass: observed, bridged, or up to the frame that holds them.
 
     Parameters
     ----------
-    seen : ndarray of int64, shape (b,)
-        Observations by piece of `STEP`; at least one piece has some.
-    solid, passed, passed_normal : ndarray of int64, shape (b,)
-        Returns on the line, beams through it, and beams through it at normal incidence, by piece.
-    gone : ndarray of bool, shape (b,)
-        Pieces that were glass once and are open now.
+    line : LineEvidence
+        What is known of it.
     config : GlassWallConfig
         Tolerances.
 
@@ -38,49 +66,45 @@ def glass_stretches(
     ndarray of bool, shape (b,)
         True for glass.
     """
+    seen, gone, opaque = line.seen, line.gone, line.opaque
     observed = (seen > 0) & ~gone
     glass = observed.copy()
     if not observed.any():
         return glass
-    # the share of beams at normal incidence that this glass answered, from the stretches where it did; but
-    # those are chosen for having answered, and it is no more than the mean of all pieces of the line
-    answers, met = int(seen[observed].sum()), seen + passed_normal
-    reach = slice(int(np.argmax(observed)), len(seen) - int(np.argmax(observed[::-1])))
-    rate = min(
-        answers / int(met[observed].sum()),
-        float(np.mean((seen[reach] / np.maximum(met[reach], 1))[met[reach] > 0])),
-    )
-    opaque = opaque_pieces(seen, solid, passed)
+    rate = _answer_rate(line.answers, line.passed_normal, observed)
     for first, last in runs(~observed):
-        inner = slice(first, last + 1)
-        between = first > 0 and last < len(seen) - 1
-        if gone[inner].any():
+        if gone[first : last + 1].any():
             continue
-        if between and _may_bridge(opaque[inner], passed[inner], passed_normal[inner], rate, config):
-            glass[inner] = True
+        if first > 0 and last < len(seen) - 1 and _may_bridge(line, slice(first, last + 1), rate, config):
+            glass[first : last + 1] = True
             continue
+        longest = config.max_extension
         if first > 0:
-            glass[_way_to_frame(range(first, last + 1), opaque, passed, config.max_extension)] = True
+            glass[_way_to_frame(range(first, last + 1), opaque, line.passed, longest)] = True
         if last < len(seen) - 1:
-            glass[_way_to_frame(range(last, first - 1, -1), opaque, passed, config.max_extension)] = True
+            glass[_way_to_frame(range(last, first - 1, -1), opaque, line.passed, longest)] = True
     return glass
 
 
-def opaque_pieces(
-    seen: NDArray[np.int64], solid: NDArray[np.int64], passed: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """Pieces of a line that stop beams and are not observed as glass, shape (b,)."""
-    return np.asarray((seen == 0) & (solid >= _SOLID_RETURNS) & (solid > passed))
+def _answer_rate(
+    answers: NDArray[np.int64], passed_normal: NDArray[np.int64], observed: NDArray[np.bool_]
+) -> float:
+    """Share of the beams at normal incidence that the glass of a line answers.
+
+    It is taken from the pieces that were observed; but those are chosen for having answered, so it is no more
+    than the mean over all pieces from the first of them to the last.
+    """
+    met = answers + passed_normal
+    if not int(answers.sum()):
+        return 0.0
+    reach = slice(int(np.argmax(observed)), len(observed) - int(np.argmax(observed[::-1])))
+    shares = (answers[reach] / np.maximum(met[reach], 1))[met[reach] > 0]
+    return min(int(answers[observed].sum()) / max(int(met[observed].sum()), 1), float(np.mean(shares)))
 
 
-def _may_bridge(
-    opaque: NDArray[np.bool_],
-    passed: NDArray[np.int64],
-    passed_normal: NDArray[np.int64],
-    rate: float,
-    config: GlassWallConfig,
-) -> bool:
+def _may_bridge(line: LineEvidence, gap: slice, rate: float, config: GlassWallConfig) -> bool:
     """Whether a gap between observed pieces is glass that nobody met at normal incidence."""
+    opaque = line.opaque[gap]
     length = len(opaque) * STEP
     if length > config.max_gap:
         return False
@@ -88,10 +112,9 @@ def _may_bridge(
     if widest > config.max_mullion:
         return False
     # glass that seldom answers even where it stands proves nothing by its silence
-    if rate > _RELIABLE and rate * int(passed_normal.sum()) > config.opening_evidence:
+    if rate > _RELIABLE and rate * int(line.passed_normal[gap].sum()) > config.opening_evidence:
         return False
-    silent = ~opaque & (passed == 0)
-    return bool(silent.sum() * STEP <= max(config.max_mullion, 0.5 * length))
+    return bool(line.hidden[gap].sum() * STEP <= max(config.max_mullion, 0.5 * length))
 
 
 def _way_to_frame(

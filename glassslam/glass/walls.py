@@ -17,8 +17,8 @@ from glassslam.glass.beams import BeamEvidence, Beams
 from glassslam.glass.chains import chains, straight_parts
 from glassslam.glass.evidence_kernels import count_along_line
 from glassslam.glass.lines import Line, fit_line, members
-from glassslam.glass.observations import GlassObservations
-from glassslam.glass.stretches import STEP, glass_stretches, opaque_pieces, runs
+from glassslam.glass.observations import LIDAR, SONAR, GlassObservations
+from glassslam.glass.stretches import STEP, LineEvidence, glass_stretches, runs
 from glassslam.glass.withdrawal import withdrawn_pieces
 from glassslam.records import FloatArray
 
@@ -26,6 +26,7 @@ __all__ = ["BeamEvidence", "Beams", "GlassWall", "fit_walls"]
 
 _SOLID_BAND = 0.1
 _BEYOND = 0.25
+_BEFORE = 0.5
 _NORMAL_LIMIT = math.radians(4.0)
 _ROUNDS = 6
 
@@ -50,6 +51,8 @@ class GlassWall:
         Standard deviation of its direction, rad.
     observed_length : float
         Length that the observations themselves prove, m; the rest is bridged.
+    by_sonar : int
+        How many of the observations sonars made.
     """
 
     start: FloatArray
@@ -60,6 +63,7 @@ class GlassWall:
     position_sigma: float
     angle_sigma: float
     observed_length: float
+    by_sonar: int = 0
 
     @property
     def length(self) -> float:
@@ -150,17 +154,21 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
     config, positions = scene.config, scene.positions
     along, everywhere = line.along(positions[chosen]), line.along(positions)
     reach = np.maximum(scene.observations.extent[chosen], 0.5 * STEP)
-    start, seen = _seen(along, reach, config.max_extension + STEP)
-    solid, passed, passed_normal = _counts(line, start, len(seen), scene.node_poses, scene.beams)
-    posts = opaque_pieces(seen, solid, passed)
-    gone = _gone(line, chosen, along, reach, (start, STEP, len(seen)), scene)
+    margin = config.max_extension + STEP
+    start = float((along - reach).min()) - margin
+    bins = math.ceil((float((along + reach).max()) + margin - start) / STEP) + 1
+    evidence = _evidence(line, chosen, along, reach, (start, STEP, bins), scene)
+    seen, posts = evidence.seen, evidence.opaque
     near = np.abs(line.gap(positions)) < config.distance_tolerance
     # a map that is not perfect bends: pieces off the line still tell where the wall goes on, but do not count
     on_line = np.isin(chosen, _on_line(line, chosen, positions, scene.normals, config))
     walls = []
-    for first, last in runs(glass_stretches(seen, solid, passed, passed_normal, gone, config)):
+    for first, last in runs(glass_stretches(evidence, config)):
         low, high = start + first * STEP, start + (last + 1) * STEP
+        # by their middles; where none is left in a piece that was cut, by what reaches into it
         inside = (along >= low - 0.5 * STEP) & (along <= high + 0.5 * STEP)
+        if not inside.any():
+            inside = (along + reach >= low) & (along - reach <= high)
         # a wall that no post holds ends with its last observation, not with the piece that lies in
         if seen[first] > 0 and not posts[first - 1]:
             low = max(low, float((along - reach)[inside].min()))
@@ -175,30 +183,42 @@ def _pieces(line: Line, chosen: NDArray[np.int64], free: NDArray[np.bool_], scen
     return walls
 
 
-def _gone(
+def _evidence(
     line: Line,
     chosen: NDArray[np.int64],
     along: FloatArray,
     reach: FloatArray,
     pieces: tuple[float, float, int],
     scene: _Scene,
-) -> NDArray[np.bool_]:
-    """Pieces of a line at which later nodes found the glass gone."""
+) -> LineEvidence:
+    """What observations and beams tell about the pieces of a line."""
+    start, _, bins = pieces
     seen = scene.observations
-    distances = np.hypot(*(seen.position[chosen] - seen.sensor[chosen]).T)
-    return withdrawn_pieces(
-        line, np.stack((along - reach, along + reach), axis=1), seen.node[chosen], distances, pieces,
-        scene.node_poses, scene.beams, scene.config.opening_evidence,
-    )  # fmt: skip
+    lidar = seen.sensor_kind[chosen] == LIDAR
+    gone = np.zeros(bins, dtype=bool)
+    if lidar.any():
+        # the lidar takes back only what it saw itself
+        own = chosen[lidar]
+        spans = np.stack((along - reach, along + reach), axis=1)[lidar]
+        distances = np.hypot(*(seen.position[own] - seen.sensor[own]).T)
+        gone = withdrawn_pieces(
+            line, spans, seen.node[own], distances, pieces, scene.node_poses, scene.beams,
+            scene.config.opening_evidence,
+        )  # fmt: skip
+    return LineEvidence(
+        _covering(along, reach, start, bins),
+        _covering(along[lidar], reach[lidar], start, bins),
+        *_counts(line, start, bins, scene.node_poses, scene.beams),
+        gone,
+    )
 
 
-def _seen(along: FloatArray, reach: FloatArray, margin: float) -> tuple[float, NDArray[np.int64]]:
-    """Where the pieces of a line begin, m, and how many observations cover each of them."""
-    start = float((along - reach).min()) - margin
-    seen = np.zeros(math.ceil((float((along + reach).max()) + margin - start) / STEP) + 1, dtype=np.int64)
+def _covering(along: FloatArray, reach: FloatArray, start: float, bins: int) -> NDArray[np.int64]:
+    """How many observations cover each piece of a line that begins at `start`, m."""
+    seen = np.zeros(bins, dtype=np.int64)
     for low, high in zip(along - reach - start, along + reach - start, strict=True):
         seen[int(low / STEP) : int(high / STEP) + 1] += 1
-    return start, seen
+    return seen
 
 
 def _is_enough(wall: GlassWall, around: int, config: GlassWallConfig) -> bool:
@@ -213,16 +233,16 @@ def _is_enough(wall: GlassWall, around: int, config: GlassWallConfig) -> bool:
 
 def _counts(
     line: Line, start: float, bins: int, node_poses: FloatArray, beams: BeamEvidence
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Solid returns, passages and passages at normal incidence by piece of the line."""
-    solid, passed, normal, nothing = (np.zeros(bins, dtype=np.int64) for _ in range(4))
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Returns on a line, passages, passages at normal incidence and returns just before it, by its pieces."""
+    solid, passed, normal, blocked, nothing = (np.zeros(bins, dtype=np.int64) for _ in range(5))
     everyone = np.arange(len(node_poses))
-    for kind, on_line in ((beams.returns, solid), (beams.silent, nothing)):
+    for kind, on_line, short in ((beams.returns, solid, blocked), (beams.silent, nothing, nothing)):
         count_along_line(
             node_poses, kind.sensors, kind.ends, kind.first, everyone, line.foot, line.direction, start,
-            STEP, _SOLID_BAND, _BEYOND, _NORMAL_LIMIT, on_line, passed, normal,
+            STEP, _SOLID_BAND, _BEYOND, _NORMAL_LIMIT, _BEFORE, on_line, passed, normal, short,
         )  # fmt: skip
-    return solid, passed, normal
+    return solid, passed, normal, blocked
 
 
 def _wall(
@@ -248,4 +268,5 @@ def _wall(
         line.position_sigma,
         line.angle_sigma,
         observed_length,
+        int((observations.sensor_kind[inside] == SONAR).sum()),
     )

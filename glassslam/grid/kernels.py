@@ -58,9 +58,11 @@ def clear_ray(
     step: int,
     prior: int,
     top: int,
+    barrier: int,
 ) -> None:
     """Lower every unmarked cell between two points given in cell units (Amanatides and Woo 1987).
 
+    The ray ends before the first cell of at least the value `barrier`.
     The path never leaves the box spanned by the two end cells, whatever the rounding: an axis that
     has reached its last cell is stepped no more.
     """
@@ -76,6 +78,8 @@ def clear_ray(
         delta_y = abs(1.0 / dy)
         next_y = (row + 1 - y0 if dy > 0.0 else y0 - row) * delta_y
     for _ in range(abs(last_column - column) + abs(last_row - row) + 1):
+        if cells[row, column] >= barrier:
+            return
         if marks[row, column] != mark:
             marks[row, column] = mark
             cells[row, column] = updated(cells[row, column], step, prior, top)
@@ -112,15 +116,19 @@ def insert_scan(
     miss_step: int,
     prior: int,
     top: int,
+    barrier: int,
 ) -> None:
     """Enter one scan: hits first, then the free space of all rays, each cell at most once.
 
     Coordinates are metres from the lower left corner of the grid; all must lie inside. `marks` holds
-    the number `mark` of the scan that changed a cell last.
+    the number `mark` of the scan that changed a cell last. Rays without echo end before cells of at least
+    the value `barrier`.
     """
     mark_hits(cells, marks, mark, hits, inverse_resolution, hit_step, prior, top)
     x0, y0 = sensor[0] * inverse_resolution, sensor[1] * inverse_resolution
-    for ends in (hits, free_ends):
-        for k in range(ends.shape[0]):
-            x1, y1 = ends[k, 0] * inverse_resolution, ends[k, 1] * inverse_resolution
-            clear_ray(cells, marks, mark, x0, y0, x1, y1, miss_step, prior, top)
+    for k in range(hits.shape[0]):
+        x1, y1 = hits[k, 0] * inverse_resolution, hits[k, 1] * inverse_resolution
+        clear_ray(cells, marks, mark, x0, y0, x1, y1, miss_step, prior, top, top + 2)
+    for k in range(free_ends.shape[0]):
+        x1, y1 = free_ends[k, 0] * inverse_resolution, free_ends[k, 1] * inverse_resolution
+        clear_ray(cells, marks, mark, x0, y0, x1, y1, miss_step, prior, top, barrier)

@@ -42,6 +42,9 @@ class ProbabilityGrid:
         Cell edge, m.
     odds : OddsModel
         Update and clamp of the cells.
+    silent_stop : float, optional
+        P(occupied) of the cells at which rays without echo end; by default they end nowhere. Dark and far
+        walls often give no echo: silence is no proof against a wall that others have seen.
 
     Attributes
     ----------
@@ -66,7 +69,9 @@ class ProbabilityGrid:
     True
     """
 
-    def __init__(self, resolution: float = 0.05, odds: OddsModel | None = None) -> None:
+    def __init__(
+        self, resolution: float = 0.05, odds: OddsModel | None = None, *, silent_stop: float | None = None
+    ) -> None:
         if not (np.isfinite(resolution) and resolution > 0):
             raise GridError(f"resolution of a grid is {resolution} m", "it must be positive")
         self.resolution = resolution
@@ -76,7 +81,11 @@ class ProbabilityGrid:
         self.cells: Cells = np.zeros((0, 0), dtype=np.uint16)
         self._marks: Cells = np.zeros((0, 0), dtype=np.uint16)
         self._mark = 0
-        self._steps = (self.odds.hit_step, self.odds.miss_step, self.odds.prior, self.odds.top)
+        known = self.table[1:-1]
+        barrier = (
+            self.odds.locked + 1 if silent_stop is None else 1 + int(np.searchsorted(known, silent_stop))
+        )
+        self._steps = (self.odds.hit_step, self.odds.miss_step, self.odds.prior, self.odds.top, barrier)
 
     def insert(self, sensor: FloatArray, hits: FloatArray, free_ends: FloatArray) -> None:
         """Enter one scan, each cell once, hits before misses.
@@ -101,10 +110,10 @@ class ProbabilityGrid:
             self._marks[:] = 0
             self._mark = 0
         self._mark += 1
-        hit, miss, prior, top = self._steps
+        hit, miss, prior, top, barrier = self._steps
         insert_scan(
             self.cells, self._marks, np.uint16(self._mark), sensor - self.origin, hits - self.origin,
-            free_ends - self.origin, 1.0 / self.resolution, hit, miss, prior, top,
+            free_ends - self.origin, 1.0 / self.resolution, hit, miss, prior, top, barrier,
         )  # fmt: skip
 
     def lock(self, points: FloatArray) -> None:

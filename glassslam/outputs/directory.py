@@ -20,8 +20,20 @@ RESULT_FILES = (
     "report.json",
 )
 """What every run writes."""
-GLASS_FILES = ("glass.geojson", "glass_beams.npz", "labels.png")
-"""What a run that looks for glass writes as well."""
+GLASS_FILES = ("glass.geojson", "glass_beams.npz", "labels.png", "calibration.yaml")
+"""What a run that looks for glass writes as well; the last only where it has calibrated its lidar itself."""
+SONAR_FILES = (
+    "sonar_map.yaml",
+    "sonar_map.pgm",
+    "sonar_map.png",
+    "fused_map.yaml",
+    "fused_map.pgm",
+    "fused_map.png",
+    "source_map.png",
+)
+"""What a run with sonar writes as well."""
+ALL_FILES = RESULT_FILES + GLASS_FILES + SONAR_FILES
+"""Everything that may stand in a results directory."""
 
 _HINTS = {
     errno.ENOSPC: "free some space or choose another disk",
@@ -34,7 +46,7 @@ _HINTS = {
 
 
 def check_directory(
-    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = RESULT_FILES + GLASS_FILES
+    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = ALL_FILES
 ) -> Path:
     """Make sure, before any work is done, that results may be written to a directory.
 
@@ -89,7 +101,7 @@ def _check_parent(directory: str | Path, target: Path) -> None:
 
 @contextmanager
 def staged_directory(
-    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = RESULT_FILES + GLASS_FILES
+    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = ALL_FILES
 ) -> Iterator[Path]:
     """Lend a temporary folder which takes the place of `directory` when the block ends without error.
 

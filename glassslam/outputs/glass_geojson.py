@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glassslam.glass.layer import GlassLayer
+from glassslam.glass.observations import SONAR
 
 if TYPE_CHECKING:
     from glassslam.glass.walls import GlassWall
@@ -46,6 +47,7 @@ def _wall(number: int, wall: "GlassWall") -> dict[str, Any]:
             "length_m": round(wall.length, 4),
             "observed_length_m": round(wall.observed_length, 4),
             "observations": wall.observations,
+            "sonar_observations": wall.by_sonar,
             "nodes": wall.nodes,
             "probability": round(wall.probability, 6),
             "position_sigma_m": round(wall.position_sigma, 5),
@@ -61,6 +63,7 @@ def _observation(layer: GlassLayer, k: int) -> dict[str, Any]:
         "Point",
         _metres(layer.positions[k]),
         {
+            "sensor": "sonar" if seen.sensor_kind[k] == SONAR else "lidar",
             "node": int(seen.node[k]),
             "normal_deg": round(math.degrees(float(layer.normals[k])), 3),
             "strength": round(float(seen.strength[k]), 4),

@@ -125,16 +125,19 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
     return _plain(report)  # type: ignore[no-any-return]
 
 
-def _glass(result: MapResult) -> dict[str, Any] | None:
-    """Glass in numbers; None where it was not looked for."""
+def _glass(result: MapResult) -> dict[str, Any]:
+    """Glass in numbers; where it was not looked for, the reason alone."""
+    chosen = {
+        "detector": result.statistics.glass_detector,
+        "reason": result.statistics.glass_reason,
+    }
     if result.glass is None:
-        return None
+        return chosen
     from glassslam.glass.ghosts import MIRRORED, SEEN_THROUGH  # noqa: PLC0415  (loads numba)
 
     layer, ghosts = result.glass, result.glass.ghosts
     return {
-        "detector": result.statistics.glass_detector,
-        "reason": result.statistics.glass_reason,
+        **chosen,
         "scheme": result.config.glass.scheme,
         "walls": len(layer.walls),
         "wall_length_m": sum(wall.length for wall in layer.walls),

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from glassslam.outputs.calibration_file import CALIBRATION_FILE, write_learnt
 from glassslam.outputs.directory import staged_directory
 from glassslam.outputs.g2o import write_g2o
 from glassslam.outputs.glass_geojson import write_glass
@@ -10,6 +11,7 @@ from glassslam.outputs.labels import write_labels
 from glassslam.outputs.map_server import write_map
 from glassslam.outputs.picture import write_picture
 from glassslam.outputs.report import Stopwatch, build_report
+from glassslam.outputs.sonar_maps import write_sonar_maps
 from glassslam.outputs.trajectory import write_tum
 from glassslam.slam.result import MapResult
 
@@ -53,6 +55,7 @@ def write_results(
             write_picture(result.map, result.trajectory, folder / "map.png", result.glass),
             write_tum(result.trajectory, folder / "trajectory.tum"),
             *_glass_files(result, folder),
+            *write_sonar_maps(result, folder),
             write_g2o(result.node_poses, result.constraints, folder / "graph.g2o"),
             folder / "config.yaml",
             folder / "report.json",
@@ -71,9 +74,10 @@ def _glass_files(result: MapResult, folder: Path) -> list[Path]:
         return []
     from glassslam.outputs.beam_labels import write_beam_labels  # noqa: PLC0415  (loads the detectors)
 
-    beams = result.glass.beams
+    beams, learnt = result.glass.beams, write_learnt(result, folder / CALIBRATION_FILE)
     return [
         write_glass(result.glass, folder / "glass.geojson"),
         *([] if beams is None else [write_beam_labels(beams, folder / "glass_beams.npz")]),
         write_labels(result.map, result.glass, folder / "labels.png"),
+        *([] if learnt is None else [learnt]),
     ]

@@ -16,7 +16,7 @@ def locks_submaps(scheme: str) -> bool:
 
 
 def miss_probability(config: Config) -> float:
-    """P(occupied) after a ray through a cell of a submap: nearly even for `lite`, so that glass fades late."""
+    """P(occupied) after a ray through a cell of a submap: nearly even for `lite`: glass fades late."""
     return LITE_MISS_PROBABILITY if config.glass.scheme == "lite" else config.submap.miss_probability
 
 

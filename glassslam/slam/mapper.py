@@ -1,6 +1,7 @@
 """The mapper: records in, a map out."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +20,10 @@ from glassslam.slam.scan_check import defect, mended, sweep_time
 from glassslam.slam.scan_queue import ScanQueue, TimedScan
 from glassslam.slam.stopwatch import Stages
 from glassslam.slam.tally import Tally, run_statistics
-from glassslam.slam.trajectory import corrected_poses
+from glassslam.slam.trajectory import PoseTracks, corrected_poses
+
+if TYPE_CHECKING:
+    from glassslam.slam.glass_watch import GlassSource
 
 
 class Mapper:
@@ -68,13 +72,18 @@ class Mapper:
         if self._waiting.is_full:
             self._process(self._waiting.take())
 
-    def finish(self, info: RecordingInfo | None = None) -> MapResult:
+    def finish(
+        self, info: RecordingInfo | None = None, glass_sources: "Sequence[GlassSource]" = ()
+    ) -> MapResult:
         """Process what waits, close the last loops, optimise and render.
 
         Parameters
         ----------
         info : RecordingInfo, optional
             The source, for the report.
+        glass_sources : sequence of callable
+            Sensors beside the lidar that see glass: from the poses of the run and the beams of the lidar to
+            observations bound to the nodes.
 
         Raises
         ------
@@ -89,12 +98,13 @@ class Mapper:
             self._global.finish()
         finally:
             self.close()
+        tracks = self._tracks()
         with self._stages.measure("glass"):
             self._glass.settle()
-            layer = self._glass.layer(self._global.nodes, self._global.poses)
+            layer = self._glass.layer(self._global.nodes, tracks, glass_sources)
         with self._stages.measure("rendering"):
-            rendering = render_run(self._global, layer, self._config)
-        return self._result(rendering, info)
+            rendering = render_run(self._global, layer, self._config, closed=len(glass_sources) > 0)
+        return self._result(rendering, tracks, info)
 
     def close(self) -> None:
         """Stop background work; without `finish` this gives the run up."""
@@ -146,23 +156,24 @@ class Mapper:
                 f"used are ranges the scans call valid, from {limits.min_range:g} to {limits.max_range:g} m",
             )
 
-    def _result(self, rendering: Rendering, info: RecordingInfo | None) -> MapResult:
-        nodes = self._global.nodes
-        poses = np.array(self._global.poses)
+    def _tracks(self) -> PoseTracks:
+        """Poses of the run as they were known at different times."""
+        nodes, poses = self._global.nodes, self._global.poses
         local, stamps = np.array(self._poses), np.array(self._tally.stamps)
-        every = corrected_poses(
-            local,
-            np.array([node.scan for node in nodes]),
-            np.array([node.pose_in_local for node in nodes]),
-            poses,
+        scans, in_local = np.array([node.scan for node in nodes]), np.array([n.pose_in_local for n in nodes])
+        return PoseTracks(
+            local=Trajectory(stamps, local),
+            partial=Trajectory(stamps, compose(np.array(self._corrections), local)),
+            nodes=Trajectory(np.array([node.stamp for node in nodes]), np.array(poses)),
+            final=Trajectory(stamps, corrected_poses(local, scans, in_local, poses)),
         )
+
+    def _result(self, rendering: Rendering, tracks: PoseTracks, info: RecordingInfo | None) -> MapResult:
         return MapResult(
             map=rendering.map,
-            trajectory=Trajectory(stamps, every),
-            local_trajectory=Trajectory(stamps, local),
-            partial_trajectory=Trajectory(stamps, compose(np.array(self._corrections), local)),
-            node_stamps=np.array([node.stamp for node in nodes]),
-            node_poses=poses,
+            lidar_map=rendering.lidar,
+            closed_map=rendering.closed,
+            tracks=tracks,
             submap_nodes=tuple(submap.nodes[0] for submap in self._global.submaps),
             constraints=self._global.graph.constraints,
             config=self._config,

@@ -22,6 +22,8 @@ from glassslam.slam.result import OccupancyMap
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
     from glassslam.glass.ghosts import Ghosts, Kept
 
+_OCCUPIED = 0.65
+
 
 @dataclass(frozen=True, slots=True)
 class Rendering:
@@ -31,15 +33,23 @@ class Rendering:
     ----------
     map : OccupancyMap
         The map.
+    lidar : OccupancyMap
+        The map without what is known of glass.
     glass : GlassLayer or None
         Its glass, with the cells it occupies.
+    closed : OccupancyMap or None
+        The map in which no beam goes through glass.
     """
 
     map: OccupancyMap
+    lidar: OccupancyMap
     glass: GlassLayer | None
+    closed: OccupancyMap | None = None
 
 
-def render_run(world: GlobalSlam, glass: GlassLayer | None, config: Config) -> Rendering:
+def render_run(
+    world: GlobalSlam, glass: GlassLayer | None, config: Config, *, closed: bool = False
+) -> Rendering:
     """Map of a finished run, with its glass locked as the scheme says.
 
     Parameters
@@ -50,19 +60,29 @@ def render_run(world: GlobalSlam, glass: GlassLayer | None, config: Config) -> R
         Glass found; None when it was not looked for.
     config : Config
         Resolution, odds and scheme.
+    closed : bool
+        Whether to draw the map in which no beam goes through glass as well.
     """
-    if glass is not None and locks_submaps(config.glass.scheme):
+    if glass is None:
+        grid = render(world.nodes, world.poses, config.map)
+        return Rendering(grid, grid, None)
+    shut = None
+    if closed:
+        shut = _locked(render(world.nodes, world.poses, config.map, glass.ghosts, "none"), glass)
+    if locks_submaps(config.glass.scheme):
         first = [submap.nodes[0] for submap in world.submaps]
         local = np.array([world.nodes[k].pose_in_local for k in first])
         moves = compose(world.poses[first], inverse(local))
         grid, cells = paint_submaps(world.submaps, moves, config.map.resolution)
-        return Rendering(grid, _with_ghost_cells(replace(glass, locked_cells=cells), world, grid))
-    ghosts = None if glass is None else glass.ghosts
-    grid = render(world.nodes, world.poses, config.map, ghosts, config.glass.ghosts_in_map)
-    if glass is None:
-        return Rendering(grid, None)
+        layer = _with_ghost_cells(replace(glass, locked_cells=cells), world, grid)
+        return Rendering(grid, render(world.nodes, world.poses, config.map), layer, shut)
+    grid = render(world.nodes, world.poses, config.map, glass.ghosts, config.glass.ghosts_in_map)
     layer = _with_ghost_cells(glass, world, grid)
-    return Rendering(grid, layer) if config.glass.scheme == "off" else with_glass(grid, layer)
+    if config.glass.scheme == "off":
+        return Rendering(grid, grid, layer, shut)
+    mask = _wall_mask(grid, glass)
+    held = OccupancyMap(locked(grid.probability, mask), grid.resolution, grid.origin)
+    return Rendering(held, grid, replace(layer, locked_cells=_centres(mask, grid)), shut)
 
 
 def render(
@@ -87,7 +107,8 @@ def render(
     kept : {"all", "seen_through", "none"}
         Which of these are shown; the rays of the others end as free space at the wall.
     """
-    grid = ProbabilityGrid(config.resolution, OddsModel(config.hit_probability, config.miss_probability))
+    odds = OddsModel(config.hit_probability, config.miss_probability)
+    grid = ProbabilityGrid(config.resolution, odds, silent_stop=_OCCUPIED)
     for node, pose, (returns, free_ends) in zip(nodes, poses, visible_rays(nodes, ghosts, kept), strict=True):
         grid.insert(
             transform_points(pose, node.sensor[None])[0],
@@ -98,12 +119,15 @@ def render(
     return OccupancyMap(grid.probability(), config.resolution, (float(grid.origin[0]), float(grid.origin[1])))
 
 
-def with_glass(grid: OccupancyMap, layer: GlassLayer) -> Rendering:
+def _locked(grid: OccupancyMap, layer: GlassLayer) -> OccupancyMap:
     """The map with the cells of its glass walls occupied."""
+    return OccupancyMap(locked(grid.probability, _wall_mask(grid, layer)), grid.resolution, grid.origin)
+
+
+def _wall_mask(grid: OccupancyMap, layer: GlassLayer) -> NDArray[np.bool_]:
+    """Cells of the map that glass walls run through, shape (rows, columns)."""
     shape = (grid.probability.shape[0], grid.probability.shape[1])
-    mask = wall_cells(layer.walls, shape, grid.origin, grid.resolution)
-    held = OccupancyMap(locked(grid.probability, mask), grid.resolution, grid.origin)
-    return Rendering(held, replace(layer, locked_cells=_centres(mask, grid)))
+    return wall_cells(layer.walls, shape, grid.origin, grid.resolution)
 
 
 def _with_ghost_cells(layer: GlassLayer, world: GlobalSlam, grid: OccupancyMap) -> GlassLayer:

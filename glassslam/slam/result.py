@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from glassslam.config import Config
 from glassslam.glass.layer import GlassLayer
 from glassslam.posegraph.graph import Constraint
 from glassslam.records import Float32Array, FloatArray, RecordingInfo, Trajectory
+from glassslam.slam.trajectory import PoseTracks
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,23 +87,42 @@ class RunStatistics:
 
 
 @dataclass(frozen=True, slots=True)
+class SonarMaps:
+    """What the sonars of a run add.
+
+    Attributes
+    ----------
+    sweeps : int
+        Sweeps within the time of the lidar.
+    sonar_map : OccupancyMap
+        Map of the sonars alone.
+    fused_map : OccupancyMap
+        Lidar and sonar joined.
+    source : ndarray of uint8, shape (rows, columns), or None
+        Who decided each cell of the fused map: 1 the lidar, 2 the sonar, 3 both, 0 neither; None for rules in
+        which no one decides.
+    """
+
+    sweeps: int
+    sonar_map: OccupancyMap
+    fused_map: OccupancyMap
+    source: NDArray[np.uint8] | None
+
+
+@dataclass(frozen=True, slots=True)
 class MapResult:
     """Everything a run found out.
 
     Attributes
     ----------
     map : OccupancyMap
-        The rendered map.
-    trajectory : Trajectory
-        Pose of the robot base at every used scan, in the map frame, in the order of the recording.
-    local_trajectory : Trajectory
-        The same poses as local SLAM saw them, in the local frame.
-    partial_trajectory : Trajectory
-        The poses of local SLAM, each moved as the last optimisation before it said; map frame.
-    node_stamps : ndarray of float64, shape (n,)
-        Times of the nodes, s.
-    node_poses : ndarray of float64, shape (n, 3)
-        Optimised poses of the base at the nodes, map frame.
+        The rendered map, with its glass.
+    lidar_map : OccupancyMap
+        The map of the beams alone, without what is known of glass.
+    closed_map : OccupancyMap or None
+        The map in which no beam goes through glass; only where other sensors than the lidar took part.
+    tracks : PoseTracks
+        Poses of scans and nodes, before and after optimisation.
     submap_nodes : tuple of int
         First node of every submap.
     constraints : tuple of Constraint
@@ -112,17 +135,33 @@ class MapResult:
         The source, when the run had one.
     glass : GlassLayer or None
         Glass walls and observations; None when glass was not looked for.
+    sonar : SonarMaps or None
+        Maps of the sonars and of lidar and sonar together; None without sonar.
     """
 
     map: OccupancyMap
-    trajectory: Trajectory
-    local_trajectory: Trajectory
-    partial_trajectory: Trajectory
-    node_stamps: FloatArray
-    node_poses: FloatArray
+    lidar_map: OccupancyMap
+    closed_map: OccupancyMap | None
+    tracks: PoseTracks
     submap_nodes: tuple[int, ...]
     constraints: tuple[Constraint, ...]
     config: Config
     statistics: RunStatistics
     info: RecordingInfo | None = None
     glass: GlassLayer | None = None
+    sonar: SonarMaps | None = None
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Pose of the robot base at every used scan, in the map frame, in the order of the recording."""
+        return self.tracks.final
+
+    @property
+    def node_stamps(self) -> FloatArray:
+        """Times of the nodes, s, shape (n,)."""
+        return self.tracks.nodes.stamps
+
+    @property
+    def node_poses(self) -> FloatArray:
+        """Optimised poses of the base at the nodes, map frame, shape (n, 3)."""
+        return self.tracks.nodes.poses

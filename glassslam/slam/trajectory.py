@@ -1,11 +1,35 @@
 """The pose of every scan, from the poses of the nodes before and after it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from glassslam.geometry import between, compose, interpolate
-from glassslam.records import FloatArray
+from glassslam.records import FloatArray, Trajectory
 
 _METRES_PER_RADIAN = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class PoseTracks:
+    """The trajectory of one run as it was known at different times.
+
+    Attributes
+    ----------
+    local : Trajectory
+        Every scan, by local SLAM alone.
+    partial : Trajectory
+        Every scan, corrected by the last optimisation before it.
+    nodes : Trajectory
+        The nodes after the last optimisation.
+    final : Trajectory
+        Every scan after the last optimisation, carried along with the nodes around it.
+    """
+
+    local: Trajectory
+    partial: Trajectory
+    nodes: Trajectory
+    final: Trajectory
 
 
 def corrected_poses(

@@ -1,8 +1,6 @@
 """Glass that sonars hear and the lidar map does not show, as oriented pieces of surface."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import fields
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,7 +9,7 @@ from glassslam.config import SonarConfig, SonarGlassConfig
 from glassslam.geometry import between
 from glassslam.glass.beams import BeamEvidence
 from glassslam.glass.evidence_kernels import count_along_line
-from glassslam.glass.observations import GlassObservations
+from glassslam.glass.observations import SONAR, GlassObservations
 from glassslam.records import FloatArray
 from glassslam.sonar.mapping import beam_width
 from glassslam.sonar.surface_kernels import COLUMNS, surface_pieces
@@ -66,21 +64,6 @@ def sonar_glass_observations(
     return _bound(pieces[glass], node_stamps, node_poses, config.glass)
 
 
-def joined_observations(parts: Sequence[GlassObservations]) -> GlassObservations:
-    """Observations of several sensors as one set, each with its own uncertainty, for one fit of walls.
-
-    Parameters
-    ----------
-    parts : sequence of GlassObservations
-        Observations bound to the same nodes.
-    """
-    columns = [field.name for field in fields(GlassObservations)]
-    everything = (GlassObservations.empty(), *parts)
-    return GlassObservations(
-        **{name: np.concatenate([getattr(part, name) for part in everything]) for name in columns}
-    )
-
-
 def _readings(sweeps: SonarSweeps, sensors: FloatArray, sonar: int, max_range: float) -> FloatArray:
     """Echoes of one sonar in time: rows of stamp, x, y, axis and range."""
     ranges = sweeps.ranges[:, sonar]
@@ -129,7 +112,7 @@ def passed_share(
             count_along_line(
                 node_poses, kind.sensors, kind.ends, kind.first, near, foot,
                 np.array([-normal[1], normal[0]]), -0.5 * length, length, _SOLID_BAND,
-                max(min_gap, _SOLID_BAND), 0.0, on_line, passed, ignored,
+                max(min_gap, _SOLID_BAND), 0.0, 0.0, on_line, passed, ignored, ignored,
             )  # fmt: skip
         total = int(solid[0] + passed[0])
         shares[k] = passed[0] / total if total >= _FEWEST_BEAMS else 0.0
@@ -149,5 +132,5 @@ def _bound(
     return GlassObservations(
         node, local[:, :2].copy(), local[:, 2].copy(), sensor[:, :2].copy(), pieces[:, 8].copy(),
         np.full(len(pieces), config.probability), pieces[:, 5].copy(), pieces[:, 6].copy(),
-        pieces[:, 7].copy(),
+        pieces[:, 7].copy(), np.full(len(pieces), SONAR, dtype=np.uint8),
     )  # fmt: skip

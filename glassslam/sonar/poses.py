@@ -1,39 +1,16 @@
 """Where the robot was at every sweep: the four kinds of poses of the pi-map paper."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
-from glassslam.geometry import compose, interpolate
-from glassslam.records import FloatArray, Trajectory
+from glassslam.geometry import interpolate
+from glassslam.records import FloatArray
+from glassslam.slam.trajectory import PoseTracks
 
 PoseKind: TypeAlias = Literal["Loc", "PG", "FG", "FGfit"]
-
-
-@dataclass(frozen=True, slots=True)
-class PoseTracks:
-    """The trajectory of one run as it was known at different times.
-
-    Attributes
-    ----------
-    local : Trajectory
-        Every scan, by local SLAM alone.
-    partial : Trajectory
-        Every scan, corrected by the last optimisation before it (see `partial_track`).
-    nodes : Trajectory
-        The nodes after the last optimisation.
-    final : Trajectory
-        Every scan after the last optimisation, carried along with the nodes around it.
-    """
-
-    local: Trajectory
-    partial: Trajectory
-    nodes: Trajectory
-    final: Trajectory
 
 
 def sweep_poses(
@@ -73,27 +50,6 @@ def sweep_poses(
         return interpolate(track.poses[before], track.poses[after], fraction), inside
     chosen = np.where(fraction > 0.5, after, before) if kind == "FG" else before
     return track.poses[chosen].copy(), inside
-
-
-def partial_track(
-    local: Trajectory, first_scans: Sequence[int], map_from_local: Sequence[FloatArray]
-) -> Trajectory:
-    """Local poses, each corrected by the offset of the last optimisation before it (pi-map, section III-A).
-
-    Parameters
-    ----------
-    local : Trajectory
-        Every scan, by local SLAM alone.
-    first_scans : sequence of int
-        Ascending numbers of the first scans to which each optimisation applies.
-    map_from_local : sequence of ndarray of float64, shape (3,)
-        Pose of the local frame in the map frame after each optimisation, m and rad.
-    """
-    if not len(first_scans):
-        return Trajectory(local.stamps, local.poses.copy())
-    offsets = np.vstack((np.zeros(3), np.asarray(map_from_local, dtype=np.float64)))
-    rounds = np.searchsorted(np.asarray(first_scans), np.arange(local.stamps.size), side="right")
-    return Trajectory(local.stamps, compose(offsets[rounds], local.poses))
 
 
 def _never_back(stamps: FloatArray) -> FloatArray:

@@ -8,7 +8,8 @@ import numpy as np
 from glassslam.errors import GridError
 from glassslam.geometry import compose
 from glassslam.records import FloatArray, RangeRing, SonarRing
-from glassslam.sonar.poses import PoseKind, PoseTracks, sweep_poses
+from glassslam.slam.trajectory import PoseTracks
+from glassslam.sonar.poses import PoseKind, sweep_poses
 
 
 @dataclass(frozen=True, slots=True)

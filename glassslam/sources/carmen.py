@@ -37,7 +37,8 @@ class CarmenRecording(Recording):
 
     def __init__(self, pieces: Sequence[Piece], found: CarmenSurvey, options: SourceOptions) -> None:
         start, stop = _window(found, options)
-        super().__init__(_info(pieces, found, options, start, stop), found.warnings)
+        span = max(start, found.begin), min(stop, found.end)
+        super().__init__(_info(pieces, found, options, start, stop), found.warnings, span)
         self._pieces = pieces
         self._found = found
         self._options = options

@@ -73,7 +73,8 @@ def test_version(capsys):
         (["--nonsense"], "error: No such option: --nonsense (see glassslam --help)"),
         (
             ["evaluate", "x.tum"],
-            "error: nothing to compare with (give --relations FILE, --trajectory TUM, --glass FILE or --truth MAP)",
+            "error: nothing to compare with"
+            " (give --relations FILE, --trajectory TUM, --glass FILE or --truth MAP)",
         ),
     ],
 )

@@ -9,13 +9,15 @@ import pytest
 import yaml
 
 import glassslam.calibration
+from detectors.beam_errors import BeamErrors
 from detectors.diffuse_fit import SurfaceSamples
 from detectors.profiles import load_profile
 from glassslam import api
 from glassslam.calibration import CalibrationResult, RecordingSummary
 from glassslam.cli import main
-from glassslam.cli.calibrate import value_rows
+from glassslam.cli.calibrate_tables import value_rows
 from glassslam.cli.settings import calibration_assignments, calibration_warnings, resolve_config
+from glassslam.errors import ConfigError
 
 
 @pytest.fixture
@@ -64,7 +66,7 @@ def test_the_procedure_of_two_distances(calls, tmp_path, capsys):
         ("two.bag", "glass", 2.0),
     ]
     assert str(sessions[1].roi) == "at bearings from -20 to 20 deg"
-    assert (options["name"], options["align"]) == ("mine", False)
+    assert (options["name"], options["align"], options["geometry"]) == ("mine", False, False)
     captured = capsys.readouterr()
     assert captured.err == ""
     for text in ("1.14 m", "thresh 10254", "11 of 11 = 100.0% (74% to 100%)", "warning: panes were tried"):
@@ -142,6 +144,27 @@ def test_unproven_thresholds_are_called_so(result):
     assert "pane" not in rows
 
 
+BEAMS = BeamErrors(0.0079, 0.0021, -0.0233, -0.0048, (0.0004, 0.0008, 0.0009, 0.0012), 685, 0.00396, 0.00369)
+
+
+def test_the_errors_of_the_beams_are_asked_for_and_shown(calls, result, tmp_path, capsys):
+    assert main(["calibrate", "run.bag", "--geometry", "-o", str(tmp_path / "out")]) == 0
+    ((_, options),) = calls
+    assert options["geometry"] is True
+    assert "bearing_cosine" not in capsys.readouterr().out
+    rows = dict(value_rows(replace(result, calibration=replace(result.calibration, beam_errors=BEAMS))))
+    assert rows["bearing_cosine"] == "0.0079 +- 0.0004 rad (0.45 deg)"
+    assert rows["lateral_offset"] == "-23.3 +- 0.9 mm"
+    assert rows["bend of walls"] == "3.96 mm without, 3.69 mm with it, 685 walls"
+
+
+def test_of_a_lidar_without_intensities_only_the_beams_are_shown(result):
+    silent = replace(result.calibration, informative=False, detector="off", beam_errors=BEAMS)
+    rows = dict(value_rows(replace(result, calibration=silent, proven=False)))
+    assert {"sensor", "limits", "detector", "range_offset"} <= set(rows)
+    assert not {"diffuse level", "calibrated_peak", "intensity_peak"} & set(rows)
+
+
 @pytest.fixture
 def mapped(monkeypatch, tiny_result):
     """Configurations with which a map was asked for."""
@@ -174,6 +197,50 @@ def test_later_assignments_go_before_it(mapped, tmp_path):
     words = ["--calibration", str(written(tmp_path)), "--set", "glass.detector=intensity_peak"]
     assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
     assert mapped[0].glass.detector == "intensity_peak"
+
+
+def used(config):
+    names = ("bearing_cosine", "bearing_sine", "lateral_offset", "range_offset")
+    return tuple(getattr(config.sensor, name) for name in names)
+
+
+def test_the_errors_of_the_beams_become_part_of_the_configuration(mapped, tmp_path):
+    path = written(tmp_path, beam_errors=BEAMS.to_dict())
+    assert main(["map", "run.bag", "--calibration", str(path), "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert used(mapped[0]) == (0.0079, 0.0021, -0.0233, -0.0048)
+    assert calibration_warnings(mapped[0]) == []
+
+
+def test_a_calibration_without_them_leaves_those_of_the_configuration(tmp_path):
+    stated = tmp_path / "config.yaml"
+    stated.write_text("sensor: {range_offset: 0.01}")
+    config = resolve_config(stated, calibration_assignments(written(tmp_path), None, stated))
+    assert used(config) == (0.0, 0.0, 0.0, 0.01)
+
+
+def test_what_is_set_goes_before_the_calibrated_beams(mapped, tmp_path):
+    words = ["--calibration", str(written(tmp_path, beam_errors=BEAMS.to_dict()))]
+    words += ["--set", "sensor.bearing_cosine=0.001"]
+    assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert used(mapped[0]) == (0.001, 0.0021, -0.0233, -0.0048)
+    assert calibration_warnings(mapped[0]) == [
+        "the beams are not corrected as calibrated: sensor.bearing_cosine is 0.001, not 0.0079"
+    ]
+
+
+def test_a_file_of_parameters_goes_before_the_calibrated_beams(mapped, tmp_path):
+    path, stated = written(tmp_path, beam_errors=BEAMS.to_dict()), tmp_path / "config.yaml"
+    stated.write_text("sensor: {max_range: 8, lateral_offset: 0.0}")
+    words = ["--calibration", str(path), "--config", str(stated)]
+    assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert used(mapped[0]) == (0.0079, 0.0021, 0.0, -0.0048)
+    assert mapped[0].sensor.max_range == 8.0
+
+
+def test_a_damaged_entry_is_named(tmp_path):
+    path = written(tmp_path, beam_errors=BEAMS.to_dict() | {"walls": "many"})
+    with pytest.raises(ConfigError, match=r"beam_errors.walls is no whole number of 0 or more: 'many'"):
+        calibration_assignments(path, None)
 
 
 def test_a_calibration_without_thresholds_leaves_the_defaults(tmp_path):

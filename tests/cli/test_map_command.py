@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from glassslam import api
@@ -10,7 +11,8 @@ from glassslam.cli.progress import amount, progress_bar, speed
 from glassslam.cli.summary import summary_rows
 from glassslam.errors import RecordingError
 from glassslam.outputs import RESULT_FILES, Usage, build_report
-from glassslam.records import RecordingInfo
+from glassslam.records import LaserScan, RecordingInfo
+from glassslam.simulation.rosbag1 import write_rosbag1
 
 
 @pytest.fixture
@@ -46,6 +48,50 @@ def test_options_reach_the_source_and_the_configuration(calls, tmp_path):
     assert (options.scan_topic, options.odom_topic, options.imu_topic) == ("/a", "/b", "/c")
     assert options.laser_pose == (-0.1, 0.0, 3.0)
     assert (options.start, options.duration, options.every, options.echo) == (1.0, 2.0, 3, "last")
+
+
+def test_intensities_can_be_required(calls, tmp_path):
+    assert main(["map", "a.bag", "-o", str(tmp_path / "out"), "--require-intensity", "-q"]) == 0
+    assert main(["map", "a.bag", "-o", str(tmp_path / "out"), "--overwrite", "-q"]) == 0
+    assert [config.glass.require_intensity for _, config, _, _ in calls] == [True, False]
+
+
+@pytest.mark.parametrize("detector", ["off", "narrow_return"])
+def test_intensities_cannot_be_required_of_a_run_that_uses_none(calls, tmp_path, capsys, detector):
+    words = ["--require-intensity", "--set", f"glass.detector={detector}"]
+    assert main(["map", "a.bag", "-o", str(tmp_path / "out"), *words]) == 2
+    assert capsys.readouterr().err == (
+        f"error: --require-intensity: the detector {detector} uses no intensities "
+        "(leave one of them out, or choose another detector)\n"
+    )
+    assert calls == []
+
+
+def test_required_intensities_that_are_missing_are_an_error(tmp_path, capsys):
+    wall = 2.0 / np.cos(-0.8 + 0.0175 * np.arange(90)).astype(np.float32)
+    scans = [LaserScan(0.1 * k, wall, -0.8, 0.0175, 0.1, 10.0) for k in range(5)]
+    write_rosbag1(scans, tmp_path / "run.bag")
+    words = ["map", str(tmp_path / "run.bag"), "-o", str(tmp_path / "out"), "-q"]
+    assert main([*words, "--require-intensity"]) == 1
+    assert capsys.readouterr().err == (
+        "error: glass cannot be looked for: the recording has no intensities "
+        "(map without --require-intensity)\n"
+    )
+    assert not (tmp_path / "out").exists()
+    assert main(words) == 0
+
+
+def test_the_summary_says_why_glass_was_not_looked_for(tiny_result):
+    tiny_result.statistics.glass_reason = "the recording has no intensities"
+    rows = dict(summary_rows(build_report(tiny_result)))
+    assert rows["glass"] == "not looked for (the recording has no intensities)"
+
+
+def test_the_summary_counts_glass(tiny_result):
+    glass = {"detector": "calibrated_peak", "reason": "the calibration given", "walls": 1}
+    glass |= {"wall_length_m": 2.04, "observations": 9}
+    rows = dict(summary_rows(build_report(tiny_result) | {"glass": glass}))
+    assert rows["glass"] == "1 wall of 2.0 m, 9 observations by calibrated_peak (the calibration given)"
 
 
 def test_sonar_options_reach_the_source(calls, tmp_path):

@@ -315,7 +315,8 @@ def test_glass_and_trajectory_are_evaluated_together(run, tiny_result, capsys):
         (
             ["{}/run"],
             2,
-            "error: nothing to compare with (give --relations FILE, --trajectory TUM, --glass FILE or --truth MAP)",
+            "error: nothing to compare with "
+            "(give --relations FILE, --trajectory TUM, --glass FILE or --truth MAP)",
         ),
         (
             ["{}/run", "--align", "--trajectory", "x"],

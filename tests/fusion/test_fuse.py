@@ -1,5 +1,7 @@
 """Every rule by its name, on one small world."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from fusion_worlds import LEFT, ring, sweeps
@@ -7,10 +9,13 @@ from fusion_worlds import LEFT, ring, sweeps
 from glassslam.config import FusionConfig, SonarConfig
 from glassslam.errors import UsageError
 from glassslam.fusion.fuse import METHODS, fuse
-from glassslam.fusion.run import fuse_recording
+from glassslam.fusion.listener import SonarListener, by_walls
+from glassslam.glass.layer import GlassLayer
+from glassslam.glass.observations import GlassObservations
+from glassslam.glass.walls import GlassWall
 from glassslam.records import RangeRing, Trajectory
 from glassslam.slam.result import OccupancyMap
-from glassslam.sonar.poses import PoseTracks
+from glassslam.slam.trajectory import PoseTracks
 
 LIDAR = """
     ########
@@ -97,17 +102,24 @@ def test_rules_along_rays_need_the_sweeps(draw_map, method):
 class TestRecording:
     """A robot at y = 0 drives along glass at y = 1; the lidar sees free space up to y = 2."""
 
-    def layer(self, drift=0.0, **config):
-        stamps = 0.1 * np.arange(31)
-        final = np.column_stack((stamps, np.zeros(31), np.zeros(31)))
-        local = final + np.array([0.0, drift, 0.0])
-        truth, drifted = Trajectory(stamps, final), Trajectory(stamps, local)
-        tracks = PoseTracks(drifted, drifted, Trajectory(stamps[::10], final[::10]), truth)
-        records = [RangeRing(float(t), np.array([1.0], np.float32)) for t in stamps]
-        cells = np.full((60, 120), 0.1, np.float32)
-        cells[50:52] = 0.9
-        lidar = OccupancyMap(cells, 0.05, (-1.5, -0.5))
-        return fuse_recording(records, ring(LEFT), tracks, lidar, SonarConfig(**config))
+    @pytest.fixture
+    def maps(self, tiny_result):
+        def make(drift=0.0, **config):
+            stamps = 0.1 * np.arange(31)
+            final = np.column_stack((stamps, np.zeros(31), np.zeros(31)))
+            local = final + np.array([0.0, drift, 0.0])
+            truth, drifted = Trajectory(stamps, final), Trajectory(stamps, local)
+            tracks = PoseTracks(drifted, drifted, Trajectory(stamps[::10], final[::10]), truth)
+            cells = np.full((60, 120), 0.1, np.float32)
+            cells[50:52] = 0.9
+            lidar = OccupancyMap(cells, 0.05, (-1.5, -0.5))
+            listener = SonarListener(ring(LEFT), SonarConfig(**config))
+            for stamp in stamps:
+                listener.add(RangeRing(float(stamp), np.array([1.0], np.float32)))
+            run = replace(tiny_result, map=lidar, lidar_map=lidar, tracks=tracks)
+            return listener.joined(run).sonar
+
+        return make
 
     def occupied_rows(self, grid, low=0.5, high=2.5):
         """y of the occupied cells between two x, m."""
@@ -115,21 +127,44 @@ class TestRecording:
         rows = np.flatnonzero((grid.probability[:, columns] > 0.65).any(axis=1))
         return grid.origin[1] + (rows + 0.5) * grid.resolution
 
-    def test_the_sonar_map_and_the_fused_map_show_the_glass(self):
-        layer = self.layer()
-        assert np.abs(self.occupied_rows(layer.sonar_map) - 1.0).max() < 0.1
-        assert {round(float(y), 1) for y in self.occupied_rows(layer.fused.map)} >= {1.0, 2.0}
-        assert len(layer.sweeps.stamps) == 31
+    def test_the_sonar_map_and_the_fused_map_show_the_glass(self, maps):
+        made = maps(fusion={"method": "rsf_all"})
+        assert np.abs(self.occupied_rows(made.sonar_map) - 1.0).max() < 0.1
+        assert {round(float(y), 1) for y in self.occupied_rows(made.fused_map)} >= {1.0, 2.0}
+        assert made.sweeps == 31
 
     @pytest.mark.parametrize(("kind", "y"), [("Loc", 1.3), ("PG", 1.3), ("FG", 1.0), ("FGfit", 1.0)])
-    def test_the_poses_are_of_the_kind_that_was_asked_for(self, kind, y):
-        layer = self.layer(drift=0.3, pose_kind=kind)
-        assert np.abs(self.occupied_rows(layer.sonar_map) - y).max() < 0.1
+    def test_the_poses_are_of_the_kind_that_was_asked_for(self, maps, kind, y):
+        made = maps(drift=0.3, pose_kind=kind)
+        assert np.abs(self.occupied_rows(made.sonar_map) - y).max() < 0.1
 
-    def test_the_rule_is_the_one_that_was_asked_for(self):
-        assert self.layer(fusion={"method": "bayes"}).fused.source is None
-        assert self.layer(fusion={"method": "rsf_all"}).fused.source is not None
+    def test_the_rule_is_the_one_that_was_asked_for(self, maps):
+        assert maps(fusion={"method": "bayes"}).source is None
+        assert maps(fusion={"method": "rsf_all"}).source is not None
 
-    def test_same_input_same_bytes(self):
-        first, second = self.layer(), self.layer()
-        assert first.fused.map.probability.tobytes() == second.fused.map.probability.tobytes()
+    def test_same_input_same_bytes(self, maps):
+        assert maps().fused_map.probability.tobytes() == maps().fused_map.probability.tobytes()
+
+
+class TestByWalls:
+    """What the lidar maps, closed at glass walls, with free space that only the sonars know."""
+
+    def fused(self, tiny_result, draw_map, walls):
+        lidar = draw_map("....\n....\n????")
+        layer = GlassLayer(walls, GlassObservations.empty(), np.empty((0, 2)), np.empty(0))
+        run = replace(tiny_result, map=lidar, lidar_map=lidar, closed_map=lidar, glass=layer)
+        return by_walls(run, draw_map("????\n????\n.#.?"))
+
+    def wall(self, observations, by_sonar):
+        ends = np.array([0.1, 1.25]), np.array([1.9, 1.25])
+        return GlassWall(*ends, observations, 5, 0.99, 0.01, 0.01, 1.0, by_sonar)
+
+    def test_free_space_of_the_sonars_fills_what_the_lidar_did_not_see(self, tiny_result, draw_map):
+        fused = self.fused(tiny_result, draw_map, ())
+        assert fused.source.tolist() == [[2, 0, 2, 0], [1, 1, 1, 1], [1, 1, 1, 1]]
+        assert np.isnan(fused.map.probability[0]).tolist() == [False, True, False, True]
+
+    @pytest.mark.parametrize(("observations", "by_sonar", "who"), [(9, 0, 1), (9, 9, 2), (9, 4, 3)])
+    def test_walls_tell_which_sensors_saw_them(self, tiny_result, draw_map, observations, by_sonar, who):
+        fused = self.fused(tiny_result, draw_map, (self.wall(observations, by_sonar),))
+        assert fused.source[2].tolist() == [who] * 4

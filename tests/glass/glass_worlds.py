@@ -21,11 +21,13 @@ class World:
         self._returns = [[] for _ in self.poses]
         self._silent = [[] for _ in self.poses]
 
-    def see(self, node, point, normal, *, probability=0.8, extent=0.05, sigma=0.02, normal_sigma=0.02):
+    def see(
+        self, node, point, normal, *, probability=0.8, extent=0.05, sigma=0.02, normal_sigma=0.02, kind=0
+    ):
         """A node observes a piece of glass."""
         pose = inverse(self.poses[node])
         x, y, turned = compose(pose, np.array([*point, normal]))
-        self._seen.append((node, x, y, turned, probability, sigma, normal_sigma, extent))
+        self._seen.append((node, x, y, turned, probability, sigma, normal_sigma, extent, kind))
 
     def hit(self, node, *points):
         """Beams of a node end on a surface."""
@@ -40,7 +42,7 @@ class World:
 
     @property
     def observations(self):
-        rows = np.array(self._seen).reshape(-1, 8)
+        rows = np.array(self._seen).reshape(-1, 9)
         return GlassObservations(
             rows[:, 0].astype(np.int64),
             rows[:, 1:3].copy(),
@@ -51,6 +53,7 @@ class World:
             rows[:, 5].copy(),
             rows[:, 6].copy(),
             rows[:, 7].copy(),
+            rows[:, 8].astype(np.uint8),
         )
 
     @property
@@ -110,10 +113,10 @@ def spans(walls):
 
 
 def naive_counts(
-    poses, sensors, points, first, foot, direction, start, step, bins, *, tolerance, beyond, limit
+    poses, sensors, points, first, foot, direction, start, step, bins, *, tolerance, beyond, limit, before
 ):
     """What `count_along_line` counts, one beam after the other with `transform_points`."""
-    solid, passed, normal = (np.zeros(bins, dtype=np.int64) for _ in range(3))
+    solid, passed, normal, blocked = (np.zeros(bins, dtype=np.int64) for _ in range(4))
     across = np.array([-direction[1], direction[0]])
     for n, pose in enumerate(poses):
         sensor = transform_points(pose, sensors[n : n + 1])[0] - foot
@@ -127,10 +130,15 @@ def naive_counts(
                 beam = end - sensor
                 if math.atan2(abs(beam @ direction), abs(beam @ across)) < limit:
                     tables.append(normal)
+            elif (end @ across) * (sensor @ across) >= 0 and abs(end @ across) <= min(
+                before, abs(sensor @ across)
+            ):
+                share = (sensor @ across) / (sensor @ across - end @ across)
+                place, tables = (sensor + share * (end - sensor)) @ direction, [blocked]
             else:
                 continue
             piece = math.floor((place - start) / step)
             if 0 <= piece < bins:
                 for table in tables:
                     table[piece] += 1
-    return solid, passed, normal
+    return solid, passed, normal, blocked

@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from glassslam.glass.evidence_kernels import count_along_line
 
-BAND, BEYOND, LIMIT, STEP = 0.1, 0.25, math.radians(4.0), 0.1
+BAND, BEYOND, LIMIT, STEP, BEFORE = 0.1, 0.25, math.radians(4.0), 0.1, 0.5
 
 
 def count(poses, sensors, points, first, foot, direction, start, bins, chosen=None):
-    solid, passed, normal = (np.zeros(bins, dtype=np.int64) for _ in range(3))
+    solid, passed, normal, blocked = (np.zeros(bins, dtype=np.int64) for _ in range(4))
     chosen = np.arange(len(poses)) if chosen is None else chosen
     count_along_line(
-        poses, sensors, points, first, chosen, foot, direction, start, STEP, BAND, BEYOND, LIMIT,
-        solid, passed, normal,
+        poses, sensors, points, first, chosen, foot, direction, start, STEP, BAND, BEYOND, LIMIT, BEFORE,
+        solid, passed, normal, blocked,
     )  # fmt: skip
-    return solid, passed, normal
+    return solid, passed, normal, blocked
 
 
 def beams(*ends, sensor=(0.0, 0.0)):
@@ -51,37 +51,55 @@ def test_it_counts_as_its_naive_twin(seed, angle):
     points = random.uniform(-4.0, 4.0, (int(lengths.sum()), 2)).astype(np.float32)
     line = (random.uniform(-1.0, 1.0, 2), np.array([math.cos(angle), math.sin(angle)]), -2.0)
     expected = naive_counts(
-        poses, sensors, points, first, *line, STEP, 40, tolerance=BAND, beyond=BEYOND, limit=LIMIT
+        poses,
+        sensors,
+        points,
+        first,
+        *line,
+        STEP,
+        40,
+        tolerance=BAND,
+        beyond=BEYOND,
+        limit=LIMIT,
+        before=BEFORE,
     )
     for counted, naive in zip(count(poses, sensors, points, first, *line, 40), expected, strict=True):
         assert counted.tolist() == naive.tolist()
 
 
 def test_a_return_on_the_line_is_solid_where_it_is():
-    assert beams((0.55, 1.05), (0.55, 0.95), (0.25, 1.0)) == [pieces(p2=1, p5=2), NONE, NONE]
+    assert beams((0.55, 1.05), (0.55, 0.95), (0.25, 1.0)) == [pieces(p2=1, p5=2), NONE, NONE, NONE]
 
 
 def test_a_beam_beyond_the_line_passed_where_it_crossed():
-    assert beams((1.1, 2.0)) == [NONE, pieces(p5=1), NONE]
+    assert beams((1.1, 2.0)) == [NONE, pieces(p5=1), NONE, NONE]
 
 
 def test_a_beam_that_crossed_at_normal_incidence_counts_twice():
-    assert beams((0.05, 2.0)) == [NONE, pieces(p0=1), pieces(p0=1)]
+    assert beams((0.05, 2.0)) == [NONE, pieces(p0=1), pieces(p0=1), NONE]
 
 
-@pytest.mark.parametrize("end", [(0.5, 0.8), (0.5, 1.2), (0.5, -2.0), (-1.0, 1.0), (9.0, 1.0)])
+@pytest.mark.parametrize("end", [(0.5, 0.4), (0.5, 1.2), (0.5, -2.0), (-1.0, 1.0), (9.0, 1.0)])
 def test_other_beams_say_nothing(end):
-    """Short of the line, just behind it, away from it, before and after its pieces."""
-    assert beams(end) == [NONE, NONE, NONE]
+    """Far short of the line, just behind it, away from it, before and after its pieces."""
+    assert beams(end) == [NONE, NONE, NONE, NONE]
 
 
 def test_the_beam_begins_at_the_laser_not_at_the_base():
-    assert beams((0.55, 2.0), sensor=(0.55, 0.0)) == [NONE, pieces(p5=1), pieces(p5=1)]
+    assert beams((0.55, 2.0), sensor=(0.55, 0.0)) == [NONE, pieces(p5=1), pieces(p5=1), NONE]
 
 
 def test_only_the_chosen_nodes_count():
     poses, sensors = np.zeros((2, 3)), np.zeros((2, 2))
     points, first = np.array([[0.55, 1.0], [0.25, 1.0]], np.float32), np.array([0, 1, 2])
     line = (np.array([0.0, 1.0]), np.array([1.0, 0.0]), 0.0, 10)
-    solid, _, _ = count(poses, sensors, points, first, *line, chosen=np.array([1]))
+    solid, *_ = count(poses, sensors, points, first, *line, chosen=np.array([1]))
     assert solid.tolist() == pieces(p2=1)
+
+
+def test_a_beam_that_ends_just_before_the_line_is_blocked_where_it_would_have_crossed():
+    assert beams((0.44, 0.8)) == [NONE, NONE, NONE, pieces(p5=1)]
+
+
+def test_a_beam_on_its_way_along_or_away_from_the_line_is_not_blocked():
+    assert beams((0.5, -0.2), (0.5, 0.6), sensor=(0.0, 0.6)) == [NONE, NONE, NONE, NONE]

@@ -21,7 +21,7 @@ def observations(entries):
     table = np.array(entries, dtype=np.float64).reshape(-1, 6)
     one = np.ones(len(table))
     node = table[:, 0].astype(np.int64)
-    return GlassObservations(node, table[:, 1:3], table[:, 3], table[:, 4:6], one, one, one, one, one)
+    return GlassObservations(node, table[:, 1:3], table[:, 3], table[:, 4:6], one, one, one, one, one, one)
 
 
 def close_angles(a, b):

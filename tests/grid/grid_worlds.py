@@ -22,7 +22,7 @@ def drawn(text):
 def visited(x0, y0, x1, y1, size=34):
     """Cells (column, row) a ray clears, found out with the kernel."""
     cells, marks = np.zeros((size, size), np.uint16), np.zeros((size, size), np.uint16)
-    clear_ray(cells, marks, np.uint16(1), x0, y0, x1, y1, -1, 100, 200)
+    clear_ray(cells, marks, np.uint16(1), x0, y0, x1, y1, -1, 100, 200, 999)
     assert ((cells > 0) == (marks == 1)).all()
     return {(int(c), int(r)) for r, c in np.argwhere(marks == 1)}
 

@@ -12,7 +12,7 @@ from glassslam.grid import OddsModel
 from glassslam.grid.kernels import extend_box, insert_scan
 
 MODEL = OddsModel()
-STEPS = (MODEL.hit_step, MODEL.miss_step, MODEL.prior, MODEL.top)
+STEPS = (MODEL.hit_step, MODEL.miss_step, MODEL.prior, MODEL.top, MODEL.locked + 1)
 NOTHING = np.empty((0, 2))
 
 # whole numbers and their neighbours: rays along and through the corners of cells

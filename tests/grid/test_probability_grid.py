@@ -225,3 +225,23 @@ def test_the_odds_of_the_grid_are_those_given():
     grid.insert(np.array([0.2, 0.2]), np.array([[2.2, 0.2]]), NOTHING)
     p = grid.probability_at(np.array([[2.2, 0.2], [1.2, 0.2]]))
     np.testing.assert_allclose(p, [0.9, 0.2], atol=2e-4)
+
+
+def test_silent_rays_end_at_walls_that_others_have_seen():
+    grids = [ProbabilityGrid(0.5, OddsModel(0.8, 0.3), silent_stop=stop) for stop in (None, 0.65)]
+    for grid in grids:
+        grid.insert(np.array([0.25, 0.25]), np.array([[1.25, 0.25]]), NOTHING)
+        for _ in range(3):
+            grid.insert(np.array([0.25, 0.25]), NOTHING, np.array([[2.25, 0.25]]))
+        grid.finish()
+    crossed, stopped = (drawing(grid.cells[3:-3, 3:-3], grid.odds.prior) for grid in grids)
+    assert (crossed, stopped) == (".....", "..#")
+
+
+def test_returns_beyond_a_wall_clear_it_even_where_silence_does_not():
+    grid = ProbabilityGrid(0.5, OddsModel(0.8, 0.3), silent_stop=0.65)
+    grid.insert(np.array([0.25, 0.25]), np.array([[1.25, 0.25]]), NOTHING)
+    for _ in range(3):
+        grid.insert(np.array([0.25, 0.25]), np.array([[2.25, 0.25]]), NOTHING)
+    grid.finish()
+    assert drawing(grid.cells[3:-3, 3:-3], grid.odds.prior) == "....#"

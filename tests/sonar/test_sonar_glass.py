@@ -9,8 +9,9 @@ from sonar_worlds import LEFT, RIGHT, ring, sweeps
 from glassslam.config import GlassWallConfig, SonarConfig
 from glassslam.geometry import compose, inverse, transform_points, wrap_angle
 from glassslam.glass.beams import BeamEvidence, Beams
+from glassslam.glass.observations import GlassObservations
 from glassslam.glass.walls import fit_walls
-from glassslam.sonar.glass import joined_observations, passed_share, sonar_glass_observations
+from glassslam.sonar.glass import passed_share, sonar_glass_observations
 
 CONFIG = SonarConfig()
 WALL_Y = 1.0
@@ -172,11 +173,11 @@ def test_the_share_of_beams_that_pass_is_counted_at_the_piece():
 def test_observations_of_several_sensors_are_one_set():
     corridor = Corridor()
     found = corridor.observed()
-    both = joined_observations([found, found])
+    both = GlassObservations.joined([found, found])
     assert len(both) == 2 * len(found)
     assert both.position[len(found) :] == pytest.approx(found.position)
     assert both.node.dtype == np.int64
-    assert len(joined_observations([])) == 0
+    assert len(GlassObservations.joined([])) == 0
 
 
 def test_pieces_belong_to_the_node_nearest_in_time_whatever_the_order_of_nodes():

@@ -10,8 +10,8 @@ from glassslam.config import FusionConfig, SonarConfig
 from glassslam.fusion.fuse import fuse
 from glassslam.fusion.revisit import side_sonars
 from glassslam.records import RangeRing, SonarRing, Trajectory
+from glassslam.slam.trajectory import PoseTracks
 from glassslam.sonar.mapping import build_sonar_map
-from glassslam.sonar.poses import PoseTracks
 from glassslam.sonar.ray_kernels import first_occupied
 from glassslam.sonar.sweeps import placed_sweeps
 
@@ -90,7 +90,7 @@ def test_fusion_closes_the_hallway_on_its_glass_side(recorded, data_dir):
         return float(np.isfinite(hits).mean())
 
     assert along.sum() > 500
-    assert closed(result.map) < 0.3
+    assert closed(result.map) < 0.4
     shares = {
         sonars: closed(fuse("rsf_all", result.map, sonar_map, sweeps, FusionConfig(sonars=sonars)).map)
         for sonars in ("all", "sides")

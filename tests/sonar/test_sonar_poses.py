@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glassslam.geometry import compose, wrap_angle
+from glassslam.geometry import wrap_angle
 from glassslam.records import Trajectory
-from glassslam.sonar.poses import PoseTracks, partial_track, sweep_poses
+from glassslam.slam.trajectory import PoseTracks
+from glassslam.sonar.poses import sweep_poses
 
 
 def track(stamps, x, theta=None):
@@ -105,16 +106,3 @@ def test_interpolated_poses_stay_between_their_neighbours(stamps):
     poses, inside = sweep_poses(tracks(), stamps, "FGfit")
     assert inside.all()
     assert poses[:, 0] == pytest.approx(30.0 + stamps)
-
-
-def test_partial_poses_follow_the_last_optimisation_before_them():
-    local = track([0, 1, 2, 3], [0, 1, 2, 3])
-    offsets = [np.array([5.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.5 * np.pi])]
-    partial = partial_track(local, [1, 3], offsets)
-    assert partial.poses[:, 0] == pytest.approx([0, 6, 7, 0])
-    assert partial.poses[3] == pytest.approx(compose(offsets[1], local.poses[3]))
-
-
-def test_without_an_optimisation_partial_poses_are_local():
-    local = track([0, 1], [0, 1])
-    assert partial_track(local, [], []).poses.tolist() == local.poses.tolist()

@@ -8,7 +8,7 @@ from sonar_worlds import LEFT, ring, sweeps
 
 from glassslam.errors import GridError
 from glassslam.records import RangeRing, Trajectory
-from glassslam.sonar.poses import PoseTracks
+from glassslam.slam.trajectory import PoseTracks
 from glassslam.sonar.sweeps import SonarSweeps, placed_sweeps
 
 TRACK = Trajectory(np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))

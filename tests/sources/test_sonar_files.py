@@ -186,11 +186,14 @@ def test_a_player_log(tmp_path):
 
 
 def test_no_overlap_in_time(pimap, tmp_path):
-    later = write_ros1(tmp_path / "later.bag", [scan(100.0), scan(101.0)])
-    with pytest.raises(RecordingError, match=r"do not overlap in time \(96\.\d s apart\)") as caught:
-        open_recording(later, SourceOptions(sonar=pimap))
-    assert caught.value.exit_code == 1
-    assert caught.value.hint == "both must be recorded at the same time, on the same clock"
+    bag = write_ros1(tmp_path / "later.bag", [scan(100.0), scan(101.0)])
+    log = tmp_path / "later.clf"
+    log.write_text(f"FLASER 2 1.0 2.0 0 0 0 0 0 0 {T0 + 100} host {T0 + 100}\n" * 2)
+    for later in (bag, log):
+        with pytest.raises(RecordingError, match=r"do not overlap in time \(96\.\d s apart\)") as caught:
+            open_recording(later, SourceOptions(sonar=pimap))
+        assert caught.value.exit_code == 1
+        assert caught.value.hint == "both must be recorded at the same time, on the same clock"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,128 @@
+"""What sonars add to a run: pieces of glass before the walls are fitted, maps afterwards."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glassslam.config import SonarConfig
+from glassslam.fusion.common_grid import on_common_grid
+from glassslam.fusion.fuse import FusedMap, fuse
+from glassslam.glass.beams import BeamEvidence
+from glassslam.glass.layer import wall_cells
+from glassslam.glass.observations import GlassObservations
+from glassslam.records import RangeRing, SonarRing
+from glassslam.slam.result import MapResult, OccupancyMap, SonarMaps
+from glassslam.slam.trajectory import PoseTracks
+from glassslam.sonar.glass import sonar_glass_observations
+from glassslam.sonar.mapping import build_sonar_map
+from glassslam.sonar.sweeps import placed_sweeps
+
+_OCCUPIED, _FREE = 0.65, 0.196
+_LIDAR, _SONAR, _BOTH = 1, 2, 3
+
+
+class SonarListener:
+    """Collects the sweeps of a run.
+
+    Parameters
+    ----------
+    ring : SonarRing
+        Where the sonars sit in the base frame.
+    config : SonarConfig
+        Glass from sonar, sonar map and fusion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import glassslam as gs
+    >>> ring = gs.SonarRing(np.zeros((1, 3)), 0.3, 0.2, 5.0)
+    >>> listener = SonarListener(ring, gs.Config().sonar)
+    >>> listener.add(gs.RangeRing(0.0, np.array([1.0], dtype=np.float32)))
+    >>> len(listener)
+    1
+    """
+
+    def __init__(self, ring: SonarRing, config: SonarConfig) -> None:
+        self._ring, self._config = ring, config
+        self._records: list[RangeRing] = []
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def add(self, sweep: RangeRing) -> None:
+        """Take one sweep, in the order of the recording."""
+        self._records.append(sweep)
+
+    def glass(self, tracks: PoseTracks, beams: BeamEvidence) -> GlassObservations:
+        """Pieces of glass that the sonars hear and the lidar looks through, bound to the nodes.
+
+        Parameters
+        ----------
+        tracks : PoseTracks
+            Poses of the run.
+        beams : BeamEvidence
+            Beams of all nodes.
+        """
+        sweeps = placed_sweeps(self._records, self._ring, tracks, "FGfit")
+        nodes = tracks.nodes
+        return sonar_glass_observations(sweeps, beams, nodes.stamps, nodes.poses, self._config)
+
+    def joined(self, result: MapResult) -> MapResult:
+        """The result with the map of the sonars, and that of lidar and sonar as the configuration says.
+
+        Revisited rays always start at the final interpolated poses (pi-map, section III-C), whatever poses
+        the sonar map is made with.
+
+        Raises
+        ------
+        GridError
+            A sweep with another number of ranges than the ring has sonars.
+        """
+        config, tracks = self._config, result.tracks
+        sweeps = placed_sweeps(self._records, self._ring, tracks, config.pose_kind)
+        sonar_map = build_sonar_map(sweeps, config)
+        if config.fusion.method == "walls":
+            fused = by_walls(result, sonar_map)
+        else:
+            # the end points of the overlay belong to the sonar layer and keep its poses
+            own = config.pose_kind == "FGfit" or config.fusion.method == "overlay"
+            used = sweeps if own else placed_sweeps(self._records, self._ring, tracks, "FGfit")
+            fused = fuse(config.fusion.method, result.lidar_map, sonar_map, used, config.fusion)
+        maps = SonarMaps(len(sweeps.stamps), sonar_map, fused.map, fused.source)
+        return replace(result, sonar=maps)
+
+
+def by_walls(result: MapResult, sonar_map: OccupancyMap) -> FusedMap:
+    """The decision layer of the project: glass walls from all sensors, which no beam of the lidar passes.
+
+    Every sensor gives oriented pieces of surface with its own uncertainty; walls are fitted to all of them
+    together, and the beams of the lidar decide how far they reach. The map is that of the lidar, with its
+    beams ending at the walls; where no beam came, it is free where the sonars say so.
+
+    Parameters
+    ----------
+    result : MapResult
+        A run with `closed_map`.
+    sonar_map : OccupancyMap
+        Map of the sonars alone.
+    """
+    closed, heard = on_common_grid([result.closed_map or result.map, sonar_map])
+    shape = (closed.probability.shape[0], closed.probability.shape[1])
+    unknown = np.isnan(closed.probability)
+    added = unknown & (heard.probability < _FREE)
+    probability = np.where(added, heard.probability, closed.probability)
+    source = np.where(unknown, 0, _LIDAR).astype(np.uint8)
+    source[added] = _SONAR
+    _mark_walls(source, result, shape, closed)
+    return FusedMap(OccupancyMap(probability, closed.resolution, closed.origin), source)
+
+
+def _mark_walls(
+    source: NDArray[np.uint8], result: MapResult, shape: tuple[int, int], grid: OccupancyMap
+) -> None:
+    """Say in the cells of glass walls which sensors saw them."""
+    for wall in result.glass.walls if result.glass else ():
+        by_lidar, by_sonar = wall.observations > wall.by_sonar, wall.by_sonar > 0
+        who = _BOTH if by_lidar and by_sonar else _SONAR if by_sonar else _LIDAR
+        source[wall_cells([wall], shape, grid.origin, grid.resolution)] = who
