@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from glassslam.config import Config
+from glassslam.config import Config, SonarConfig
 from glassslam.records import LaserScan, RangeRing, Record, RecordingInfo
 from glassslam.sources import SourceOptions, open_recording
 
@@ -87,27 +87,88 @@ def map_recording(
     array([12.31,  4.02,  1.57])
     >>> gs.write_results(result, "run-map")  # doctest: +SKIP
     """
-    paths = [recording] if isinstance(recording, str | Path) else list(recording)
-    source = open_recording(paths, source_options or SourceOptions())
-    # The kernels are loaded only now: a recording that cannot be read is told at once.
-    from glassslam.slam.mapper import Mapper  # noqa: PLC0415
-
-    config = config or Config()
-    mapper = Mapper(config, source.info.base_from_laser)
-    sonar = _listener(source, config)
-    reporter = _Reporter(progress, source.info)
-    try:
-        _feed(mapper, sonar, _filtered(source, config), reporter)
-        reporter.tell("finishing")
-        result = mapper.finish(source.info, [sonar.glass] if sonar else [])
-    finally:
-        mapper.close()
-    if sonar:
-        result = sonar.joined(result)
+    run, reporter = _slam(recording, config, source_options, progress)
+    result = run.result()
     reporter.tell("done")
-    result.statistics.messages_dropped.update(source.dropped)
-    result.statistics.warnings[:0] = source.warnings
     return result
+
+
+class FinishedRun:
+    """SLAM of a recording, from which results can be drawn several times with other parameters of the sonars.
+
+    Parameters
+    ----------
+    mapper : Mapper
+        The mapper, finished.
+    sonar : SonarListener or None
+        Sweeps of the recording; None where it has none.
+    source : Recording
+        The source, read to its end.
+
+    Examples
+    --------
+    >>> import glassslam as gs
+    >>> run = gs.run_slam("run.bag")  # doctest: +SKIP
+    >>> sides = run.result(run.config.sonar.model_copy(update={"pose_kind": "Loc"}))  # doctest: +SKIP
+    """
+
+    def __init__(self, mapper: "Mapper", sonar: "SonarListener | None", source: "Recording") -> None:
+        self._mapper, self._sonar, self._source = mapper, sonar, source
+
+    @property
+    def config(self) -> Config:
+        """The configuration of the run."""
+        return self._mapper.config
+
+    def result(self, sonar: SonarConfig | None = None) -> "MapResult":
+        """Map, trajectory and statistics of the run.
+
+        Parameters
+        ----------
+        sonar : SonarConfig, optional
+            Parameters of the sonars in place of those of the run; its `scan_filter` acts before SLAM and has
+            no effect here.
+
+        Raises
+        ------
+        GridError
+            A sweep with another number of ranges than the ring has sonars.
+        """
+        listener = self._sonar
+        if listener is None:
+            result = self._mapper.drawn(self._source.info)
+        else:
+            listener = listener if sonar is None else listener.with_config(sonar)
+            result = listener.joined(self._mapper.drawn(self._source.info, [listener.glass]))
+        result.statistics.messages_dropped.update(self._source.dropped)
+        result.statistics.warnings[:0] = self._source.warnings
+        return result
+
+
+def run_slam(
+    recording: str | Path | Sequence[str | Path],
+    config: Config | None = None,
+    *,
+    source_options: SourceOptions | None = None,
+    progress: ProgressCallback | None = None,
+) -> FinishedRun:
+    """Localise and map a recording, and leave the drawing of results to the caller.
+
+    Parameters
+    ----------
+    recording, config, source_options, progress
+        As for `map_recording`.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read, or holds no usable scan (`NoScansError`).
+    UsageError
+        The options do not fit the recording.
+    """
+    run, reporter = _slam(recording, config, source_options, progress)
+    reporter.tell("done")
+    return run
 
 
 class _Reporter:
@@ -131,6 +192,30 @@ class _Reporter:
     def tell(self, stage: Literal["mapping", "finishing", "done"]) -> None:
         if self._callback is not None:
             self._callback(Progress(stage, self.scans, self._last - self._first, self._info))
+
+
+def _slam(
+    recording: str | Path | Sequence[str | Path],
+    config: Config | None,
+    source_options: SourceOptions | None,
+    progress: ProgressCallback | None,
+) -> tuple[FinishedRun, _Reporter]:
+    paths = [recording] if isinstance(recording, str | Path) else list(recording)
+    source = open_recording(paths, source_options or SourceOptions())
+    # The kernels are loaded only now: a recording that cannot be read is told at once.
+    from glassslam.slam.mapper import Mapper  # noqa: PLC0415
+
+    config = config or Config()
+    mapper = Mapper(config, source.info.base_from_laser)
+    sonar = _listener(source, config)
+    reporter = _Reporter(progress, source.info)
+    try:
+        _feed(mapper, sonar, _filtered(source, config), reporter)
+        reporter.tell("finishing")
+        mapper.settle()
+    finally:
+        mapper.close()
+    return FinishedRun(mapper, sonar, source), reporter
 
 
 def _listener(source: "Recording", config: Config) -> "SonarListener | None":

@@ -65,7 +65,7 @@ def mapped_views(
     if not panes:
         raise CalibrationError(f"{path} holds no pane", "a recording without glass is of --material no-glass")
     truth = np.concatenate(panes)
-    config = _config(calibration, align=align)
+    config = mapping_config(calibration, align=align)
     result = map_recording(reading.session.recording, config, source_options=options, progress=progress)
     poses = _poses(reading, result)
     if align:
@@ -143,7 +143,8 @@ def _plane(start: FloatArray, end: FloatArray) -> Plane | None:
     return Plane(normal, distance, (low, high)) if high - low > LEAST_LENGTH else None
 
 
-def _config(calibration: Calibration, *, align: bool) -> Config:
+def mapping_config(calibration: Calibration, *, align: bool) -> Config:
+    """How a recording with stated panes is mapped: its beams corrected, glass looked for only to align."""
     glass: dict[str, Any] = {"detector": "off"}
     if align:
         glass = {"detector": "calibrated_peak", "calibration": calibration.to_dict()}

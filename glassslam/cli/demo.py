@@ -14,14 +14,15 @@ EXAMPLES = """\
 
 _SCENE = "office"
 _LIDAR = "ust10lx"
+_SONARS = "pioneer-3dx"
 
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Where everything is written.")]
 
 
 def demo(output: Output = Path("demo_out")) -> int:
-    """Record a robot in a simulated office, map the recording, and compare the trajectory with the truth.
+    """Record a robot in a simulated office, map the recording, and compare the result with the truth.
 
-    DIR holds the recording with its truth, and DIR/map the results, as glassslam map writes them.
+    The robot has a lidar with intensities, odometry and a ring of sonars. DIR holds the recording with its truth, and DIR/map the results, as glassslam map writes them.
     """
     from glassslam.cli.map import map_command  # noqa: PLC0415
     from glassslam.cli.simulate import describe, record  # noqa: PLC0415
@@ -30,10 +31,10 @@ def demo(output: Output = Path("demo_out")) -> int:
 
     bag, results = output / "demo.bag", output / "map"
     _check_own(output, bag)
-    simulation = simulate(Scene.load(find_scene(_SCENE)), _LIDAR)
+    simulation = simulate(Scene.load(find_scene(_SCENE)), _LIDAR, sonar=_SONARS)
     written = record(simulation, bag)
     emit(describe(simulation, written) + "\n")
-    code = map_command([bag], output=results, sensor=_LIDAR, overwrite=True)
+    code = map_command([bag], output=results, overwrite=True)
     emit(_verdict(results / "trajectory.tum", written.true_trajectory))
     emit(_glass_verdict(results / "glass.geojson", written.true_glass))
     emit(f"\nlook at {results / 'map.png'}\nnext: glassslam map YOUR.bag -o DIR\n")

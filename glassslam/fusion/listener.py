@@ -54,6 +54,12 @@ class SonarListener:
         """Take one sweep, in the order of the recording."""
         self._records.append(sweep)
 
+    def with_config(self, config: SonarConfig) -> "SonarListener":
+        """A listener with the same sweeps and other parameters."""
+        other = SonarListener(self._ring, config)
+        other._records = self._records
+        return other
+
     def glass(self, tracks: PoseTracks, beams: BeamEvidence) -> GlassObservations:
         """Pieces of glass that the sonars hear and the lidar looks through, bound to the nodes.
 

@@ -61,6 +61,11 @@ class Mapper:
         self._tally = Tally()
         self._glass = GlassWatch(self._config.glass, self._base_from_laser, self._config.sensor)
 
+    @property
+    def config(self) -> Config:
+        """All parameters."""
+        return self._config
+
     def add(self, record: Record) -> None:
         """Take one record, in the order of the recording."""
         if isinstance(record, LaserScan):
@@ -90,6 +95,17 @@ class Mapper:
         NoScansError
             Not one usable scan came in, or not one had a return.
         """
+        self.settle()
+        return self.drawn(info, glass_sources)
+
+    def settle(self) -> None:
+        """Process what waits, close the last loops and optimise: the first half of `finish`.
+
+        Raises
+        ------
+        NoScansError
+            Not one usable scan came in, or not one had a return.
+        """
         try:
             self._process(self._waiting.take(everything=True))
             for submap in self._local.finish():
@@ -98,6 +114,19 @@ class Mapper:
             self._global.finish()
         finally:
             self.close()
+
+    def drawn(
+        self, info: RecordingInfo | None = None, glass_sources: "Sequence[GlassSource]" = ()
+    ) -> MapResult:
+        """Glass and maps of a run that is settled; they may be drawn again with other sensors.
+
+        Parameters
+        ----------
+        info : RecordingInfo, optional
+            The source, for the report.
+        glass_sources : sequence of callable
+            As for `finish`.
+        """
         tracks = self._tracks()
         with self._stages.measure("glass"):
             self._glass.settle()

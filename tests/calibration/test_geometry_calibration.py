@@ -13,7 +13,7 @@ from detectors.diffuse import DiffuseCurve
 from glassslam.api import map_recording
 from glassslam.calibration import Session, calibrate, read_calibration, write_calibration
 from glassslam.calibration.geometry import find_beam_errors, geometry_advice
-from glassslam.calibration.mapped import _config
+from glassslam.calibration.mapped import mapping_config
 from glassslam.cli.settings import calibration_assignments, resolve_config
 from glassslam.errors import CalibrationError
 from glassslam.evaluation import evaluate_glass
@@ -148,10 +148,10 @@ def test_nothing_asked_for_is_nothing_to_doubt():
 
 def test_recordings_with_stated_panes_are_mapped_with_corrected_beams():
     lidar = Calibration("mine", DiffuseCurve((1.0,), (900.0,)), beam_errors=SURE)
-    assert _config(lidar, align=False).sensor.lateral_offset == -0.023
-    assert _config(lidar, align=False).glass.detector == "off"
-    assert _config(replace(lidar, beam_errors=None), align=True).sensor.lateral_offset == 0.0
-    assert _config(lidar, align=True).glass.calibration["sensor"] == "mine"
+    assert mapping_config(lidar, align=False).sensor.lateral_offset == -0.023
+    assert mapping_config(lidar, align=False).glass.detector == "off"
+    assert mapping_config(replace(lidar, beam_errors=None), align=True).sensor.lateral_offset == 0.0
+    assert mapping_config(lidar, align=True).glass.calibration["sensor"] == "mine"
 
 
 def test_the_calibration_a_run_has_made_of_itself_finds_the_same_again(tmp_path):

@@ -9,6 +9,7 @@ from glassslam import api
 from glassslam.cli import main
 from glassslam.cli.progress import amount, progress_bar, speed
 from glassslam.cli.summary import summary_rows
+from glassslam.cli.terminal import emit_rich
 from glassslam.errors import RecordingError
 from glassslam.outputs import RESULT_FILES, Usage, build_report
 from glassslam.records import LaserScan, RecordingInfo
@@ -85,6 +86,11 @@ def test_the_summary_says_why_glass_was_not_looked_for(tiny_result):
     tiny_result.statistics.glass_reason = "the recording has no intensities"
     rows = dict(summary_rows(build_report(tiny_result)))
     assert rows["glass"] == "not looked for (the recording has no intensities)"
+
+
+def test_paths_and_warnings_are_not_cut_to_the_width_of_the_terminal(capsys):
+    emit_rich("wrote " + "/folder" * 40)
+    assert capsys.readouterr().out == "wrote " + "/folder" * 40 + "\n"
 
 
 def test_the_summary_counts_glass(tiny_result):
