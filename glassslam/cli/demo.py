@@ -22,7 +22,8 @@ Output = Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Whe
 def demo(output: Output = Path("demo_out")) -> int:
     """Record a robot in a simulated office, map the recording, and compare the result with the truth.
 
-    The robot has a lidar with intensities, odometry and a ring of sonars. DIR holds the recording with its truth, and DIR/map the results, as glassslam map writes them.
+    The robot has a lidar with intensities, odometry and a ring of sonars. DIR holds the recording with its
+    truth, and DIR/map the results, as glassslam map writes them.
     """
     from glassslam.cli.map import map_command  # noqa: PLC0415
     from glassslam.cli.simulate import describe, record  # noqa: PLC0415

@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glassslam.config import GlassConfig, SensorConfig
-from glassslam.records import LaserScan
+from glassslam.records import LaserScan, Trajectory
 from glassslam.slam.glass_watch import GlassWatch
 from glassslam.slam.local import LocalResult
 from glassslam.slam.node import Node
 from glassslam.slam.range_data import base_motion, prepare
+from glassslam.slam.trajectory import PoseTracks
 
 STILL = np.zeros(3)
 PEAK = GlassConfig(detector="intensity_peak", thresh=5000.0, grad=500.0, width=5)
@@ -41,6 +42,12 @@ def placed(pose, node=None):
     pose = np.array(pose, dtype=np.float64)
     made = None if node is None else Node(node, node, 0.0, pose, np.zeros(2), NONE, NONE, 0.1)
     return LocalResult(pose, made, [], None)
+
+
+def tracks(count):
+    """A run of nodes that never moved."""
+    track = Trajectory(0.1 * np.arange(count), np.zeros((count, 3)))
+    return PoseTracks(track, track, track, track)
 
 
 def watched(*steps, config=PEAK, laser=(0.0, 0.0, 0.0), twist=STILL):
@@ -127,7 +134,7 @@ def test_scans_that_came_before_the_decision_are_looked_at_after_it():
         assert look.sighting() is None
         watch.add(look, placed((0.1 * k, 0.0, 0.0), k))
     watch.settle()
-    layer = watch.layer([placed(STILL, k).node for k in range(12)], np.zeros((12, 3)))
+    layer = watch.layer([placed(STILL, k).node for k in range(12)], tracks(12))
     assert layer.beams.stamps.tolist() == [one.stamp for one in scans]
 
 
@@ -144,4 +151,4 @@ def test_whether_a_scan_waited_for_the_decision_makes_no_difference():
 
 def test_without_a_detector_there_is_no_layer():
     watch = watched((shining(50), placed(STILL, 0)), config=GlassConfig(detector="off"))
-    assert watch.layer([], np.zeros((0, 3))) is None
+    assert watch.layer([], tracks(0)) is None

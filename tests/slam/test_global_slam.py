@@ -2,6 +2,7 @@
 
 import threading
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -166,10 +167,7 @@ def test_a_search_held_up_until_it_is_waited_for_changes_nothing(run, monkeypatc
 
 def test_nodes_after_a_doubtful_step_are_held_less_firmly(run):
     steps, _ = run
-    doubtful = [
-        (Node(*(getattr(node, name) for name in node.__slots__[:-1]), node.index == 5), None)
-        for node, _ in steps[:10]
-    ]
+    doubtful = [(replace(node, doubtful=node.index == 5), None) for node, _ in steps[:10]]
     world = GlobalSlam(CONFIG, Stages())
     feed(world, (doubtful, []))
     weights = world.graph.edges.weights

@@ -16,7 +16,7 @@ CONFIG = Config.from_mapping(
         "optimization": {"optimize_every_n_nodes": 60},
     }
 )
-ELSEWHERE = {"glass"}
+ELSEWHERE = {"glass", "sonar"}
 """Sections that are read by other parts."""
 
 
