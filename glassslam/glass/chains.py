@@ -9,11 +9,8 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from glassslam.glass.lines import axial_difference
+from glassslam.glass.chain_kernels import join_pieces
 from glassslam.records import FloatArray
 
 _CELL = 0.1
@@ -65,18 +62,8 @@ def chains(
         How far a piece may lie from the tangent of the other, m.
     """
     centres, axes, group = merge_pieces(positions, normals)
-    pairs = cKDTree(centres).query_pairs(max_gap, output_type="ndarray")
-    steps = centres[pairs[:, 1]] - centres[pairs[:, 0]]
-    length = np.hypot(steps[:, 0], steps[:, 1])
-    heading = np.arctan2(steps[:, 1], steps[:, 0])
-    allowed = np.where(length < 2.0 * _CELL, np.pi, _SLACK + np.arctan2(distance, length))
-    fits = axial_difference(axes[pairs[:, 0]], axes[pairs[:, 1]]) < 2.0 * _SLACK
-    for end in (0, 1):
-        fits &= axial_difference(axes[pairs[:, end]] + 0.5 * np.pi, heading) < allowed
-    linked = pairs[fits]
-    count = len(centres)
-    graph = coo_array((np.ones(len(linked)), (linked[:, 0], linked[:, 1])), shape=(count, count))
-    _, component = connected_components(graph, directed=False)
+    component = np.empty(len(centres), dtype=np.int64)
+    join_pieces(centres, axes, max_gap, distance, 2.0 * _CELL, _SLACK, component)
     label = component[group]
     found = [np.flatnonzero(label == c) for c in np.unique(label)]
     return sorted(found, key=lambda members: (-len(members), int(members[0])))

@@ -197,7 +197,6 @@ def _evidence(
     lidar = seen.sensor_kind[chosen] == LIDAR
     gone = np.zeros(bins, dtype=bool)
     if lidar.any():
-        # the lidar takes back only what it saw itself
         own = chosen[lidar]
         spans = np.stack((along - reach, along + reach), axis=1)[lidar]
         distances = np.hypot(*(seen.position[own] - seen.sensor[own]).T)
@@ -205,6 +204,8 @@ def _evidence(
             line, spans, seen.node[own], distances, pieces, scene.node_poses, scene.beams,
             scene.config.opening_evidence,
         )  # fmt: skip
+        # the lidar takes back only what it alone saw
+        gone &= _covering(along[~lidar], reach[~lidar], start, bins) == 0
     return LineEvidence(
         _covering(along, reach, start, bins),
         _covering(along[lidar], reach[lidar], start, bins),
@@ -254,19 +255,31 @@ def _wall(
     observed_length: float,
 ) -> GlassWall:
     """One wall from the line, its ends, and the observations on it."""
-    belief = np.clip(observations.probability[inside], 0.02, 0.98)
-    nodes = np.unique(observations.node[inside])
-    # observations from one node see the same beams: they count once, as strongly as the best of them
-    best = [float(belief[observations.node[inside] == node].max()) for node in nodes]
-    evidence = float(sum(math.log(p / (1.0 - p)) for p in best))
+    evidence = _evidence_for(inside, observations)
     return GlassWall(
         line.foot + low * line.direction,
         line.foot + high * line.direction,
         len(inside),
-        len(nodes),
+        len(np.unique(observations.node[inside])),
         1.0 / (1.0 + math.exp(-min(evidence, 50.0))),
         line.position_sigma,
         line.angle_sigma,
         observed_length,
         int((observations.sensor_kind[inside] == SONAR).sum()),
     )
+
+
+def _evidence_for(inside: NDArray[np.int64], observations: GlassObservations) -> float:
+    """Log odds that a wall is glass, by the observations on it."""
+    sonar = observations.sensor_kind[inside] == SONAR
+    by_lidar, by_sonar = (_node_evidence(inside[part], observations) for part in (~sonar, sonar))
+    # what the lidar takes for a post rather than a pane does not speak against the panes beside it
+    return by_lidar + by_sonar if not sonar.any() else max(by_lidar, 0.0) + by_sonar
+
+
+def _node_evidence(chosen: NDArray[np.int64], observations: GlassObservations) -> float:
+    """The same for observations of one kind of sensor."""
+    belief, nodes = np.clip(observations.probability[chosen], 0.02, 0.98), observations.node[chosen]
+    # observations from one node see the same beams: they count once, as strongly as the best of them
+    best = [float(belief[nodes == node].max()) for node in np.unique(nodes)]
+    return float(sum(math.log(p / (1.0 - p)) for p in best))
