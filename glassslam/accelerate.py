@@ -2,8 +2,10 @@
 
 import hashlib
 import os
+import stat
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -17,6 +19,17 @@ def _writable(folder: Path) -> bool:
             return True
     except OSError:
         return False
+
+
+def _own_folder() -> Path:
+    """A folder for temporary files that nobody else can write: a cached kernel is code that will be run."""
+    folder = Path(tempfile.gettempdir()) / f"glassslam-numba-{os.getuid()}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        state = folder.lstat()
+        if stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o022:
+            return folder
+    return Path(tempfile.mkdtemp(prefix="glassslam-numba-"))
 
 
 def _fingerprint() -> str:
@@ -35,7 +48,7 @@ def _choose_cache_folder() -> None:
     if "NUMBA_CACHE_DIR" in os.environ and _writable(Path(os.environ["NUMBA_CACHE_DIR"])):
         return
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser() / ".cache") / "glassslam" / "numba"
-    base = user if _writable(user) else Path(tempfile.gettempdir()) / f"glassslam-numba-{os.getuid()}"
+    base = user if _writable(user) else _own_folder()
     folder = base / _fingerprint()
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
 

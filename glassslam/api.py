@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -15,7 +15,7 @@ from glassslam.sources import SourceOptions, open_recording
 if TYPE_CHECKING:
     from glassslam.fusion.listener import SonarListener
     from glassslam.slam.mapper import Mapper
-    from glassslam.slam.result import MapResult
+    from glassslam.slam.result import MapResult, OccupancyMap
     from glassslam.sources import Recording
 
 _SECONDS_BETWEEN_REPORTS = 0.1
@@ -70,7 +70,8 @@ def map_recording(
     -------
     MapResult
         Map, trajectory, pose graph and statistics; what the source dropped is counted in
-        `statistics.messages_dropped`, what it warned of stands in `statistics.warnings`.
+        `statistics.messages_dropped`, what it warned of stands in `statistics.warnings`, and what could not
+        be read of it in `statistics.damage`.
 
     Raises
     ------
@@ -120,7 +121,13 @@ class FinishedRun:
         """The configuration of the run."""
         return self._mapper.config
 
-    def result(self, sonar: SonarConfig | None = None) -> "MapResult":
+    def returns_map(self) -> "OccupancyMap":
+        """Map of the lidar in which beams without echo clear nothing."""
+        return self._mapper.returns_map()
+
+    def result(
+        self, sonar: SonarConfig | None = None, lidar_map: "OccupancyMap | None" = None
+    ) -> "MapResult":
         """Map, trajectory and statistics of the run.
 
         Parameters
@@ -128,6 +135,8 @@ class FinishedRun:
         sonar : SonarConfig, optional
             Parameters of the sonars in place of those of the run; its `scan_filter` acts before SLAM and has
             no effect here.
+        lidar_map : OccupancyMap, optional
+            What the rules that join two maps take for the map of the lidar.
 
         Raises
         ------
@@ -139,8 +148,10 @@ class FinishedRun:
             result = self._mapper.drawn(self._source.info)
         else:
             listener = listener if sonar is None else listener.with_config(sonar)
-            result = listener.joined(self._mapper.drawn(self._source.info, [listener.glass]))
+            result = self._mapper.drawn(self._source.info, [listener.glass])
+            result = listener.joined(result if lidar_map is None else replace(result, lidar_map=lidar_map))
         result.statistics.messages_dropped.update(self._source.dropped)
+        result.statistics.damage.extend(self._source.damage)
         result.statistics.warnings[:0] = self._source.warnings
         return result
 

@@ -8,6 +8,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from glassslam.errors import ConfigError
+from glassslam.yamltext import parse_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -285,7 +286,7 @@ class FusionConfig(Section):
     glass_gap: Positive = 0.5
     """A ray meets glass when its lidar length exceeds its sonar length by more, m (`rsf_*`)."""
     sonars: Literal["all", "sides"] = "all"
-    """Sonars along which maps are revisited: all, or the one nearest to each side (`rsf_*`)."""
+    """Sonars in use: all, or only the one that looks most nearly to each side."""
     lidar_weight: NonNegative = 0.75
     """Weight of the lidar map in `lop` and `liop`."""
     sonar_weight: NonNegative = 0.25
@@ -383,7 +384,7 @@ class Config(Section):
         """
         try:
             text = Path(path).read_text(encoding="utf-8")
-            data = yaml.safe_load(text)
+            data = parse_yaml(text)
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
             raise ConfigError(f"cannot read configuration {path}: {_first_line(error)}") from error
         return cls.from_mapping({} if data is None else data, origin=str(path))

@@ -157,6 +157,49 @@ Record: TypeAlias = LaserScan | Odometry | Imu | RangeRing | PointSet
 
 
 @dataclass(frozen=True, slots=True)
+class Damage:
+    """A part of a recording that could not be read.
+
+    Attributes
+    ----------
+    file : str
+        The file, as given.
+    offset : int
+        Byte at which the part begins.
+    bytes : int
+        Its length as far as the file holds it.
+    first_stamp, last_stamp : float or None
+        Record times between which messages are missing, s; None when not known.
+    messages_lost : int
+        How many messages of all topics are missing; an estimate where no index says it.
+    reason : str
+        What is wrong with it.
+    """
+
+    file: str
+    offset: int
+    bytes: int
+    first_stamp: float | None
+    last_stamp: float | None
+    messages_lost: int
+    reason: str
+
+    @property
+    def seconds_lost(self) -> float:
+        """Recorded time between the messages around the damage, s; 0 when not known."""
+        if self.first_stamp is None or self.last_stamp is None:
+            return 0.0
+        return max(0.0, self.last_stamp - self.first_stamp)
+
+    @property
+    def text(self) -> str:
+        """One line for a user."""
+        lost = f"about {self.messages_lost} messages and {self.seconds_lost:.1f} s lost"
+        what = lost if self.messages_lost else "no message lost"
+        return f"{self.file}: {self.bytes} bytes at offset {self.offset} unreadable ({self.reason}): {what}"
+
+
+@dataclass(frozen=True, slots=True)
 class RecordingInfo:
     """What a source knows of the recording it streams.
 

@@ -10,6 +10,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from glassslam.errors import ConfigError
+from glassslam.yamltext import parse_yaml
 
 _M = TypeVar("_M", bound=BaseModel)
 
@@ -23,7 +24,7 @@ def load_yaml_model(path: str | Path, model: type[_M]) -> _M:
         The file cannot be read, is no mapping, or holds an unknown, missing or unfit value.
     """
     try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        data = parse_yaml(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         cause = error.strerror if isinstance(error, OSError) else str(error).splitlines()[0]
         raise ConfigError(f"cannot read {path}: {cause}") from error

@@ -23,7 +23,7 @@ class Source:
     def __init__(self, paths, options):
         self.paths, self.options = paths, options
         self.info = RecordingInfo(tuple(map(str, paths)), "carmen", 2.0, 3, (0.1, 0.2, 0.3))
-        self.dropped, self.warnings = {}, []
+        self.dropped, self.warnings, self.damage = {}, [], []
 
     def records(self):
         yield from (scan(10.0), Odometry(10.5, (0.0, 0.0, 0.0)), scan(12.0), scan(11.5))
@@ -43,7 +43,10 @@ def world(monkeypatch, tiny_result):
         def add(self, record):
             notes.records.append(record)
 
-        def finish(self, info=None, glass_sources=()):
+        def settle(self):
+            notes.settled = True
+
+        def drawn(self, info=None, glass_sources=()):
             notes.info = info
             return tiny_result
 
@@ -66,6 +69,16 @@ def test_every_record_reaches_the_mapper_in_order(world, tiny_result):
     assert world.config == gs.Config()
     assert world.base_from_laser == (0.1, 0.2, 0.3)
     assert world.info is world.source.info
+
+
+def test_results_of_one_run_can_be_drawn_again(world, tiny_result):
+    told = []
+    run = api.run_slam("run.clf", progress=told.append)
+    assert world.settled
+    assert not hasattr(world, "info")
+    assert told[-1].stage == "done"
+    assert run.result() is run.result() is tiny_result
+    assert len(world.records) == 4
 
 
 def test_configuration_options_and_several_paths_are_handed_on(world):

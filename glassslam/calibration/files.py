@@ -9,6 +9,7 @@ from glassslam.calibration.result import CalibrationResult
 from glassslam.errors import ConfigError
 from glassslam.outputs.calibration_file import CALIBRATION_FILE, as_yaml
 from glassslam.outputs.directory import staged_directory
+from glassslam.yamltext import parse_yaml
 
 FILES = (CALIBRATION_FILE, "calibration.png")
 """What a calibration directory holds."""
@@ -60,7 +61,7 @@ def read_calibration(path: str | Path) -> Calibration:
     file = Path(path) / FILES[0] if Path(path).is_dir() else Path(path)
     hint = "it is written by glassslam calibrate"
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+        content = parse_yaml(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"cannot read calibration {file}: {error.strerror}", hint) from error
     except (UnicodeDecodeError, yaml.YAMLError) as error:

@@ -1,6 +1,7 @@
 """The errors of the beams as a part of a calibration: from all recordings of a lidar, or refused."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from detectors.beam_errors import LARGEST, SIGNIFICANT, BeamErrors
 from glassslam.calibration.bearing import estimate_beam_errors
@@ -67,8 +68,10 @@ def _rounded(errors: BeamErrors) -> BeamErrors:
 
 
 def _scans(sessions: Sequence[Session], options: SourceOptions | None) -> Iterator[LaserScan]:
+    # Half a recording may hold half a turn: what is damaged calibrates nothing.
+    whole = replace(options or SourceOptions(), strict=True)
     for session in sessions:
-        for record in open_recording(session.recording, options).records():
+        for record in open_recording(session.recording, whole).records():
             if isinstance(record, LaserScan) and not defect(record):
                 yield mended(record)
 

@@ -68,9 +68,9 @@ def read(session: Session, options: SourceOptions | None = None) -> Reading:
     Raises
     ------
     RecordingError
-        The recording cannot be read or has no scans.
+        The recording cannot be read, is damaged or has no scans.
     """
-    source = open_recording(session.recording, options)
+    source = open_recording(session.recording, replace(options or SourceOptions(), strict=True))
     kept: list[tuple[int, LaserScan]] = []
     count, stride = 0, 1
     for record in source.records():

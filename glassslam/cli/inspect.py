@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from glassslam.cli.map import Sonar, SonarRing, SonarTopic
+from glassslam.cli.map import Sonar, SonarRing, SonarTopic, Strict
 
 if TYPE_CHECKING:
     from glassslam.sources.report import (
@@ -44,22 +44,24 @@ def inspect(
     sonar: Sonar = None,
     sonar_topic: SonarTopic = None,
     sonar_ring: SonarRing = None,
+    strict: Strict = False,
     json: Json = False,
-) -> None:
+) -> int:
     """Show topics, times, scan geometry, silent beams, intensities, sonar, frames, and what map would use."""
     from glassslam.cli.terminal import emit, emit_rich  # noqa: PLC0415
     from glassslam.sources import SourceOptions  # noqa: PLC0415  (loads numpy)
     from glassslam.sources.inspection import inspect_recording  # noqa: PLC0415
 
     wishes = tuple(sonar_topic) if sonar_topic else None
-    options = SourceOptions(sonar=sonar, sonar_topic=wishes, sonar_ring=sonar_ring)
+    options = SourceOptions(sonar=sonar, sonar_topic=wishes, sonar_ring=sonar_ring, strict=strict)
     report = inspect_recording(recordings, options)
     if json:
         from json import dumps  # noqa: PLC0415
 
         emit(dumps(report.to_dict(), indent=2, allow_nan=False) + "\n")
-        return
-    emit_rich(_topics(report), "", _facts(report))
+    else:
+        emit_rich(_topics(report), "", _facts(report))
+    return 3 if report.damage else 0
 
 
 def _topics(report: "RecordingReport") -> Table:
@@ -96,6 +98,8 @@ def rows(report: "RecordingReport") -> Rows:
         yield from _sonar_rows(sonar)
     for number, edge in enumerate(report.transforms):
         yield "" if number else "frames", _transform(edge)
+    for damage in report.damage:
+        yield "damage", damage.text
     for reason, count in report.dropped.items():
         yield "dropped", f"{count} x {reason}"
     for warning in report.warnings:

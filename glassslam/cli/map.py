@@ -91,6 +91,7 @@ Every = Annotated[int, typer.Option(metavar="N", help="Use every N-th scan.")]
 Echo = Annotated[
     str, typer.Option(metavar="WHICH", help="Echo of multi-echo scans: first, last or strongest.")
 ]
+Strict = Annotated[bool, typer.Option("--strict", help="Refuse a damaged bag, rather than read the rest.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the report as JSON instead of the summary.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
@@ -115,6 +116,7 @@ def map_command(
     duration: Duration = None,
     every: Every = 1,
     echo: Echo = "first",
+    strict: Strict = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
@@ -165,8 +167,12 @@ def map_command(
         sonar=sonar,
         sonar_topic=tuple(sonar_topic) if sonar_topic else None,
         sonar_ring=sonar_ring,
+        strict=strict,
     )
-    return _run(recordings, directory, resolved, options, stopwatch, overwrite, json, quiet)
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
+
+    with locked(directory):
+        return _run(recordings, directory, resolved, options, stopwatch, overwrite, json, quiet)
 
 
 def _run(
@@ -207,5 +213,7 @@ def _print_json(report: dict[str, Any], directory: Path) -> None:
 
 
 def is_damaged(report: dict[str, Any]) -> bool:
-    """Whether anything was dropped that the user did not ask to leave out."""
-    return any((*report["scans"]["dropped"].values(), *report["messages_dropped"].values()))
+    """Whether anything could not be read, or was dropped that the user did not ask to leave out."""
+    return bool(report["damage"] or report["solver_failures"]) or any(
+        (*report["scans"]["dropped"].values(), *report["messages_dropped"].values())
+    )

@@ -9,6 +9,7 @@ import yaml
 
 from glassslam.config import Config
 from glassslam.errors import ConfigError, UsageError
+from glassslam.yamltext import parse_yaml
 
 
 def resolve_config(file: Path | None, assignments: Sequence[str]) -> Config:
@@ -155,7 +156,7 @@ def _assign(data: dict[str, Any], assignment: str) -> None:
         if not isinstance(data, dict):
             raise ConfigError(f"--set {assignment}: {section!r} is a value, not a section")
     try:
-        data[last] = yaml.safe_load(text)
+        data[last] = parse_yaml(text)
     except yaml.YAMLError as error:
         raise ConfigError(f"--set {assignment}: the value is not YAML") from error
 

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from glassslam.cli.progress import speed
 from glassslam.cli.terminal import emit_rich
+from glassslam.records import Damage
 
 
 def show_summary(report: dict[str, Any], written: Sequence[Path]) -> None:
@@ -35,6 +36,7 @@ def summary_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     rows = [
         ("scans", f"{scans['read']} read, {scans['used']} used, {_dropped(scans['dropped'])}"),
         *_unread(report["messages_dropped"]),
+        *_damage(report["damage"]),
         ("recorded", f"{report['recording_seconds']:.1f} s, {report['distance_m']:.1f} m travelled"),
         ("map", f"{width:.1f} x {height:.1f} m, {shape['resolution']:g} m per cell"),
         ("graph", f"{report['nodes']} nodes, {report['submaps']} submaps"),
@@ -74,6 +76,10 @@ def _dropped(reasons: dict[str, int]) -> str:
 
 def _unread(reasons: dict[str, int]) -> list[tuple[str, str]]:
     return [("unreadable", f"{count} x {reason}") for reason, count in reasons.items() if count]
+
+
+def _damage(parts: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    return [("damage", Damage(**part).text) for part in parts]
 
 
 def _rejected(closures: dict[str, Any]) -> str:

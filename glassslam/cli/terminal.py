@@ -9,6 +9,8 @@ from glassslam.errors import OutputError
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+_LONGEST = 1000  # characters: messages quote what they have found
+
 
 def emit(text: str) -> None:
     """Write a result to standard output; a reader that has gone away is no error.
@@ -47,6 +49,7 @@ def emit_rich(*parts: "RenderableType") -> None:
 
 def complain(message: str, hint: str = "", *, code: int) -> int:
     """Write one line with cause and hint to standard error, and hand the exit code on."""
+    message = message if len(message) <= _LONGEST else f"{message[:_LONGEST]} ..."
     line = f"error: {message} ({hint})" if hint else f"error: {message}"
     if sys.stderr is not None:
         try:

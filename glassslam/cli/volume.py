@@ -11,6 +11,8 @@ from glassslam.errors import UsageError
 if TYPE_CHECKING:
     from glassslam.records import Record, Trajectory
     from glassslam.sources import SourceOptions
+    from glassslam.sources.recording import Recording as OpenRecording
+    from glassslam.sources.sonarfile import SonarFile
     from glassslam.volume.mapper import Volume
 
 EXAMPLES = """\
@@ -84,7 +86,7 @@ def volume(
     check_folder(target, overwrite=overwrite)
     poses = _standing() if trajectory is None else read_tum(trajectory)
     options = VolumeOptions(resolution=resolution, lidar_height=lidar_height, pool=pool)
-    records, laser_pose, dropped = _records(recording, SourceOptions(sonar_topic=sonar_topic))
+    source, records, laser_pose, dropped = _records(recording, SourceOptions(sonar_topic=sonar_topic))
     built = build_volume(records, poses, options, laser_pose)
     _check_seen(built, recording)
     seen_from_above = project(built.fused, band, projection)
@@ -96,14 +98,15 @@ def volume(
         overwrite=overwrite,
     )
     summary = _summary(built, {**dropped, **built.dropped}, written)
+    summary["damage"] = [damage.text for damage in source.damage]
     _show(summary, json)
-    return 3 if summary["dropped"] else 0
+    return 3 if summary["dropped"] or summary["damage"] else 0
 
 
 def _records(
     path: Path, options: "SourceOptions"
-) -> tuple["Iterable[Record]", tuple[float, float, float], dict[str, int]]:
-    """Records, pose of the laser, and what is dropped while they are read."""
+) -> tuple["OpenRecording | SonarFile", "Iterable[Record]", tuple[float, float, float], dict[str, int]]:
+    """The source, its records, pose of the laser, and what is dropped while they are read."""
     from glassslam.errors import NoScansError  # noqa: PLC0415
     from glassslam.sources import open_recording  # noqa: PLC0415
     from glassslam.sources.sonarfile import open_sonar  # noqa: PLC0415
@@ -116,8 +119,9 @@ def _records(
         def drop(reason: str) -> None:
             dropped[reason] = dropped.get(reason, 0) + 1
 
-        return open_sonar(path, options).records(drop), (0.0, 0.0, 0.0), dropped
-    return source.records(), source.info.base_from_laser, source.dropped
+        file = open_sonar(path, options)
+        return file, file.records(drop), (0.0, 0.0, 0.0), dropped
+    return source, source.records(), source.info.base_from_laser, source.dropped
 
 
 def _standing() -> "Trajectory":
@@ -177,6 +181,7 @@ def _show(summary: dict[str, Any], as_json: bool) -> None:
         f"{size} m, {summary['occupied_voxels']} occupied voxels of {summary['resolution']:g} m, "
         f"{summary['leaves']} leaves, {summary['bytes'] / 1e6:.1f} MB",
         *(f"dropped: {count} x {reason}" for reason, count in summary["dropped"].items()),
+        *(f"damage: {text}" for text in summary["damage"]),
         *(f"wrote {path}" for path in summary["written"]),
     ]
     emit("".join(f"{line}\n" for line in lines))

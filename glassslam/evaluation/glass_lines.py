@@ -14,6 +14,7 @@ from glassslam.records import FloatArray
 Segments: TypeAlias = FloatArray
 """Start and end points, shape (n, 2, 2), m."""
 
+_FARTHEST = 1e5  # m: what lies farther away is no building, and would be sampled every centimetre
 _TRUE_KINDS = frozenset({"wall", "glass"})
 _FOUND_KINDS = frozenset({"wall"})
 
@@ -93,7 +94,7 @@ def _read_json(path: str | Path, hint: str = "") -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise EvaluationError(f"cannot read {path}: {error.strerror}", hint) from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise EvaluationError(f"{path} is no JSON", "glass is read from GeoJSON") from error
 
 
@@ -133,9 +134,10 @@ def _points(coordinates: list[Any]) -> FloatArray | None:
     """Planar part of the coordinates, shape (n, 2); None where they are no points."""
     try:
         points = np.array([position[:2] for position in coordinates], dtype=np.float64)
-    except (TypeError, ValueError, IndexError, KeyError):
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError):
         return None
-    return points if points.ndim == 2 and points.shape[1] == 2 and np.isfinite(points).all() else None
+    sound = points.ndim == 2 and points.shape[1] == 2 and bool((np.abs(points) < _FARTHEST).all())
+    return points if sound else None
 
 
 def _panes_of_runs(runs: Any, path: str | Path) -> list[Segments]:
@@ -145,7 +147,7 @@ def _panes_of_runs(runs: Any, path: str | Path) -> list[Segments]:
     name, lines = next(iter(runs.items()))
     try:
         return [pane for line in lines for pane in _panes_of_line(line)]
-    except (TypeError, ValueError, KeyError) as error:
+    except (TypeError, ValueError, KeyError, OverflowError) as error:
         raise EvaluationError(
             f"run {name} of {path} has a line that cannot be read",
             "expected x_of_y [a, b], y_from, y_to and mullions_y, in m",
@@ -156,6 +158,6 @@ def _panes_of_line(line: Any) -> list[Segments]:
     slope, offset = (float(value) for value in line["x_of_y"])
     borders = [float(y) for y in (line["y_from"], *line.get("mullions_y", ()), line["y_to"])]
     points = np.array([(slope * y + offset, y) for y in sorted(borders)])
-    if not np.isfinite(points).all():
+    if not (np.abs(points) < _FARTHEST).all():
         raise ValueError
     return [points[None, k : k + 2] for k in range(len(points) - 1)]

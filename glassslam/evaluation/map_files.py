@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from glassslam.errors import OutputError, UsageError
@@ -12,6 +11,7 @@ from glassslam.outputs import map_server
 from glassslam.outputs.labels import GLASS, read_labels
 from glassslam.outputs.table import read_text
 from glassslam.slam.result import OccupancyMap
+from glassslam.yamltext import parse_yaml
 
 _PICTURES = frozenset({".pgm", ".png"})
 
@@ -71,7 +71,7 @@ def read_glass_cells(path: str | Path) -> NDArray[np.bool_] | None:
 
 
 def _mode(location: Path) -> Any:
-    return yaml.safe_load(read_text(location, OutputError)).get("mode", "trinary")
+    return parse_yaml(read_text(location, OutputError)).get("mode", "trinary")
 
 
 def _picture(location: Path, resolution: float | None) -> OccupancyMap:

@@ -26,3 +26,20 @@ def count_ends(
             row, column = r, c
             passed[r, c] += 1
         ended[end_row, end_column] += 1
+
+
+@kernel
+def clear_rays(
+    starts: FloatArray, ends: FloatArray, occupied: NDArray[np.bool_], cleared: NDArray[np.bool_]
+) -> None:
+    """Mark the cells of rays up to the first occupied one, or to the border; points (k, 2) in cells."""
+    rows, columns = occupied.shape
+    for k in range(starts.shape[0]):
+        x, y = starts[k, 0], starts[k, 1]
+        dx, dy = ends[k, 0] - x, ends[k, 1] - y
+        steps = math.ceil(2.0 * math.hypot(dx, dy)) + 1
+        for s in range(steps):
+            row, column = math.floor(y + dy * s / steps), math.floor(x + dx * s / steps)
+            if not (0 <= row < rows and 0 <= column < columns) or occupied[row, column]:
+                break
+            cleared[row, column] = True

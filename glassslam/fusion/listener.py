@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.config import SonarConfig
-from glassslam.fusion.common_grid import on_common_grid
 from glassslam.fusion.fuse import FusedMap, fuse
+from glassslam.fusion.layer_kernels import clear_rays
+from glassslam.fusion.revisit import FREE, side_sonars
 from glassslam.glass.beams import BeamEvidence
 from glassslam.glass.layer import wall_cells
 from glassslam.glass.observations import GlassObservations
@@ -16,9 +17,10 @@ from glassslam.slam.result import MapResult, OccupancyMap, SonarMaps
 from glassslam.slam.trajectory import PoseTracks
 from glassslam.sonar.glass import sonar_glass_observations
 from glassslam.sonar.mapping import build_sonar_map
-from glassslam.sonar.sweeps import placed_sweeps
+from glassslam.sonar.poses import PoseKind
+from glassslam.sonar.sweeps import SonarSweeps, placed_sweeps
 
-_OCCUPIED, _FREE = 0.65, 0.196
+_OCCUPIED = 0.65
 _LIDAR, _SONAR, _BOTH = 1, 2, 3
 
 
@@ -70,7 +72,7 @@ class SonarListener:
         beams : BeamEvidence
             Beams of all nodes.
         """
-        sweeps = placed_sweeps(self._records, self._ring, tracks, "FGfit")
+        sweeps = self._placed(tracks, "FGfit")
         nodes = tracks.nodes
         return sonar_glass_observations(sweeps, beams, nodes.stamps, nodes.poses, self._config)
 
@@ -86,42 +88,63 @@ class SonarListener:
             A sweep with another number of ranges than the ring has sonars.
         """
         config, tracks = self._config, result.tracks
-        sweeps = placed_sweeps(self._records, self._ring, tracks, config.pose_kind)
+        sweeps = self._placed(tracks, config.pose_kind)
         sonar_map = build_sonar_map(sweeps, config)
         if config.fusion.method == "walls":
-            fused = by_walls(result, sonar_map)
+            fused = by_walls(result, self._placed(tracks, "FGfit"), config)
         else:
             # the end points of the overlay belong to the sonar layer and keep its poses
             own = config.pose_kind == "FGfit" or config.fusion.method == "overlay"
-            used = sweeps if own else placed_sweeps(self._records, self._ring, tracks, "FGfit")
+            used = sweeps if own else self._placed(tracks, "FGfit")
             fused = fuse(config.fusion.method, result.lidar_map, sonar_map, used, config.fusion)
         maps = SonarMaps(len(sweeps.stamps), sonar_map, fused.map, fused.source)
         return replace(result, sonar=maps)
 
+    def _placed(self, tracks: PoseTracks, kind: PoseKind) -> SonarSweeps:
+        """The sweeps of the sonars in use."""
+        sweeps = placed_sweeps(self._records, self._ring, tracks, kind)
+        return sweeps.only(side_sonars(self._ring)) if self._config.fusion.sonars == "sides" else sweeps
 
-def by_walls(result: MapResult, sonar_map: OccupancyMap) -> FusedMap:
+
+def by_walls(result: MapResult, sweeps: SonarSweeps, config: SonarConfig) -> FusedMap:
     """The decision layer of the project: glass walls from all sensors, which no beam of the lidar passes.
 
     Every sensor gives oriented pieces of surface with its own uncertainty; walls are fitted to all of them
     together, and the beams of the lidar decide how far they reach. The map is that of the lidar, with its
-    beams ending at the walls; where no beam came, it is free where the sonars say so.
+    beams ending at the walls; where no beam came, it is free up to where a sonar heard something, but not
+    behind what is occupied.
 
     Parameters
     ----------
     result : MapResult
         A run with `closed_map`.
-    sonar_map : OccupancyMap
-        Map of the sonars alone.
+    sweeps : SonarSweeps
+        Readings at the final poses.
+    config : SonarConfig
+        Longest reading used.
     """
-    closed, heard = on_common_grid([result.closed_map or result.map, sonar_map])
-    shape = (closed.probability.shape[0], closed.probability.shape[1])
+    closed = result.closed_map or result.map
     unknown = np.isnan(closed.probability)
-    added = unknown & (heard.probability < _FREE)
-    probability = np.where(added, heard.probability, closed.probability)
+    added = unknown & _cleared(closed, sweeps, config)
+    probability = np.where(added, np.float32(FREE), closed.probability)
     source = np.where(unknown, 0, _LIDAR).astype(np.uint8)
     source[added] = _SONAR
-    _mark_walls(source, result, shape, closed)
+    _mark_walls(source, result, (source.shape[0], source.shape[1]), closed)
     return FusedMap(OccupancyMap(probability, closed.resolution, closed.origin), source)
+
+
+def _cleared(grid: OccupancyMap, sweeps: SonarSweeps, config: SonarConfig) -> NDArray[np.bool_]:
+    """Cells of a map on the axes of sonars, up to their readings and to what is occupied."""
+    ranges, ring = sweeps.ranges, sweeps.ring
+    heard = np.isfinite(ranges) & (ranges >= ring.range_min)
+    sensors = sweeps.sensors[heard]
+    axes = np.column_stack((np.cos(sensors[:, 2]), np.sin(sensors[:, 2])))
+    reach = np.minimum(ranges[heard], min(config.max_range, ring.range_max)) - config.arc_thickness
+    starts = (sensors[:, :2] - np.asarray(grid.origin)) / grid.resolution
+    ends = starts + np.maximum(reach, 0.0)[:, None] * axes / grid.resolution
+    cleared = np.zeros(grid.probability.shape, dtype=np.bool_)
+    clear_rays(starts, ends, grid.probability > _OCCUPIED, cleared)
+    return cleared
 
 
 def _mark_walls(

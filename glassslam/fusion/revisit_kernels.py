@@ -35,9 +35,17 @@ def ray_cells(row: int, column: int, angle: float, path: NDArray[np.int64], rows
 
 @kernel
 def first_stop(occupied: NDArray[np.bool_], path: NDArray[np.int64], count: int) -> int:
-    """Number of the first occupied cell on a path after its first cell; `count` when there is none."""
+    """Number of the cell after the first at which a path is stopped; `count` when there is none.
+
+    It is stopped by an occupied cell, and by two that touch at the corner through which it would slip.
+    """
     for k in range(1, count):
-        if occupied[path[k, 0], path[k, 1]]:
+        row, column = path[k, 0], path[k, 1]
+        if occupied[row, column]:
+            return k
+        before_row, before_column = path[k - 1, 0], path[k - 1, 1]
+        # on a straight step one of these two is free: the cell before, or this one
+        if occupied[before_row, column] and occupied[row, before_column] and k > 1:
             return k
     return count
 
@@ -66,7 +74,8 @@ def revisit(
 
     `path` has room for rows + columns cells. A ray meets glass when its lidar length exceeds its sonar
     length by more than `gap` cells (pi-map, equation 13); other rays are written only with `everything`, and
-    then as the lidar has them (equations 14 and 15). A ray that nothing stops is not written.
+    then as the lidar has them (equations 14 and 15). A ray that nothing stops is not written. Walls of one
+    cell that run aslant hold it as well, which Bresenham's line would slip through.
     """
     rows, columns = fused.shape
     met = 0
@@ -85,6 +94,7 @@ def revisit(
         for c in range(stop):
             fused[path[c, 0], path[c, 1]] = free
             source[path[c, 0], path[c, 1]] = sensor
-        fused[path[stop, 0], path[stop, 1]] = occupied
-        source[path[stop, 0], path[stop, 1]] = sensor
+        if (sonar if glass else lidar)[path[stop, 0], path[stop, 1]]:
+            fused[path[stop, 0], path[stop, 1]] = occupied
+            source[path[stop, 0], path[stop, 1]] = sensor
     return met

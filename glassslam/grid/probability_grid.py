@@ -12,9 +12,17 @@ from glassslam.records import Float32Array, FloatArray
 
 _MARGIN_CELLS = 48
 _CROP_MARGIN_CELLS = 3  # the bicubic neighbourhood of a border cell stays inside
+MOST_CELLS = 200_000_000
+"""Largest grid: 700 m x 700 m in cells of 5 cm."""
+_BYTES_PER_CELL = 8  # its value, the mark of the last scan, and P(occupied)
+_FARTHEST_CELL = 2.0**40
 _LAST_MARK = np.iinfo(np.uint16).max
 
-__all__ = ["OddsModel", "ProbabilityGrid", "point_array"]
+_TOO_FAR = (
+    "are ranges or odometry wrong? lower sensor.max_range, or raise map.resolution and submap.resolution"
+)
+
+__all__ = ["MOST_CELLS", "OddsModel", "ProbabilityGrid", "check_size", "point_array"]
 
 
 def point_array(points: Any) -> FloatArray:
@@ -31,6 +39,23 @@ def point_array(points: Any) -> FloatArray:
     if array.ndim != 2 or array.shape[1] != 2:
         raise GridError(f"points of shape {array.shape}", "give an array of shape (n, 2)")
     return array
+
+
+def check_size(columns: float, rows: float, resolution: float) -> None:
+    """Refuse a grid of more than `MOST_CELLS` before memory is asked for.
+
+    Raises
+    ------
+    GridError
+        It would have more cells than that; the message tells metres and gigabytes.
+    """
+    if columns * rows > MOST_CELLS:
+        gigabytes = columns * rows * _BYTES_PER_CELL / 1e9
+        raise GridError(
+            f"a map of {columns * resolution:.0f} x {rows * resolution:.0f} m in cells of "
+            f"{resolution:g} m would take {gigabytes:.1f} GB",
+            _TOO_FAR,
+        )
 
 
 class ProbabilityGrid:
@@ -102,7 +127,8 @@ class ProbabilityGrid:
         Raises
         ------
         GridError
-            A coordinate that is not finite, or an array of another shape.
+            A coordinate that is not finite, an array of another shape, or a grid that would be larger than
+            `MOST_CELLS`, which then stays as it is.
         """
         sensor, hits, free_ends = point_array([sensor])[0], point_array(hits), point_array(free_ends)
         self._contain(sensor, hits, free_ends)
@@ -177,6 +203,8 @@ class ProbabilityGrid:
         finite = extend_box(hits, box) & extend_box(free_ends, box) & bool(np.isfinite(sensor).all())
         if not finite:
             raise GridError("scan with a coordinate that is not finite", "leave out invalid beams")
+        if max(map(abs, box.tolist())) > _FARTHEST_CELL * self.resolution:
+            raise GridError(f"scan with a coordinate of {np.abs(box).max():.3g} m", _TOO_FAR)
         if self.cells.size == 0:
             self.origin = np.floor(sensor / self.resolution) * self.resolution
         if self._marks.shape != self.cells.shape:  # finished before
@@ -187,6 +215,8 @@ class ProbabilityGrid:
         before = np.where(first < 2, _MARGIN_CELLS - np.minimum(first, 0), 0)
         after = np.where(last >= size - 2, np.maximum(_MARGIN_CELLS + last - size, 0), 0)
         if before.any() or after.any():
+            columns, rows = (size + before + after).tolist()
+            check_size(columns, rows, self.resolution)
             self.cells = _padded(self.cells, before, after)
             self._marks = _padded(self._marks, before, after)
             self.origin = self._corner_moved_by(-before)

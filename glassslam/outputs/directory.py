@@ -5,7 +5,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from glassslam.errors import OutputError, UsageError
@@ -18,6 +18,7 @@ RESULT_FILES = (
     "graph.g2o",
     "config.yaml",
     "report.json",
+    "report.html",
 )
 """What every run writes."""
 GLASS_FILES = ("glass.geojson", "glass_beams.npz", "labels.png", "calibration.yaml")
@@ -126,6 +127,7 @@ def staged_directory(
     """
     target = check_directory(directory, overwrite=overwrite, files=files)
     staged: Path | None = None
+    made = [folder for folder in target.parents if not folder.exists()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         staged = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
@@ -134,17 +136,20 @@ def staged_directory(
         for path in (*staged.iterdir(), staged):
             _flush(path)
         _publish(staged, target)
-        _flush(target.parent)
     except OSError as error:
         raise _unwritable(directory, error) from error
     finally:
         if staged is not None:
             shutil.rmtree(staged, ignore_errors=True)
+        for folder in made:
+            with suppress(OSError):  # it holds the results, or what others have written meanwhile
+                folder.rmdir()
 
 
 def _publish(staged: Path, target: Path) -> None:
     if not target.exists():
         staged.rename(target)
+        _flush_names(target.parent)
         return
     retired = staged.with_suffix(".old")
     try:
@@ -153,8 +158,17 @@ def _publish(staged: Path, target: Path) -> None:
     except BaseException:
         if retired.exists() and not target.exists():
             retired.rename(target)
+        # where another run has put its results meanwhile, they are the newer ones
+        shutil.rmtree(retired, ignore_errors=True)
         raise
+    _flush_names(target.parent)
     shutil.rmtree(retired, ignore_errors=True)
+
+
+def _flush_names(folder: Path) -> None:
+    # everything is in its place: a disk that cannot promise it for the next power cut does not undo that
+    with suppress(OSError):
+        _flush(folder)
 
 
 def _flush(path: Path) -> None:

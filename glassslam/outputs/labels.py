@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from glassslam.errors import OutputError
 from glassslam.glass.layer import GlassLayer, wall_cells
+from glassslam.outputs.image_file import read_image
 from glassslam.slam.result import OccupancyMap
 
 _OCCUPIED, _FREE = 0.65, 0.196
@@ -60,15 +61,7 @@ def read_labels(path: Path) -> NDArray[np.uint8]:
     OutputError
         The file cannot be read, is no picture, or shows other colours.
     """
-    import cv2  # noqa: PLC0415  (only pictures need it)
-
-    try:
-        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise OutputError(f"cannot read {path}: {error.strerror}") from error
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-    if image is None:
-        raise OutputError(f"{path} is not an image")
+    image = read_image(path, colour=True)
     labels = np.full(image.shape[:2], 255, dtype=np.uint8)
     for label, colour in enumerate(_COLOURS):
         labels[(image == colour).all(axis=2)] = label

@@ -9,9 +9,11 @@ import yaml
 from numpy.typing import NDArray
 
 from glassslam.errors import OutputError
+from glassslam.outputs.image_file import read_image
 from glassslam.outputs.table import read_text
 from glassslam.records import Float32Array
 from glassslam.slam.result import OccupancyMap
+from glassslam.yamltext import parse_yaml
 
 OCCUPIED_THRESH = 0.65
 FREE_THRESH = 0.196
@@ -132,7 +134,7 @@ def _trinary(occupied: NDArray[np.float64], free: float, full: float) -> Float32
 
 def _read_fields(location: Path) -> dict[str, Any]:
     try:
-        fields = yaml.safe_load(read_text(location, OutputError))
+        fields = parse_yaml(read_text(location, OutputError))
     except yaml.YAMLError as error:
         raise OutputError(f"{location} is not YAML: {str(error).splitlines()[0]}") from error
     if not isinstance(fields, dict) or not fields.get("image"):
@@ -147,13 +149,4 @@ def _read_fields(location: Path) -> dict[str, Any]:
 
 
 def _read_image(location: Path) -> NDArray[np.float64]:
-    import cv2  # noqa: PLC0415  (only reading maps needs it)
-
-    try:
-        data = np.frombuffer(location.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise OutputError(f"cannot read {location}: {error.strerror}") from error
-    image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
-    if image is None:
-        raise OutputError(f"{location} is not an image")
-    return np.asarray(image, dtype=np.float64)
+    return read_image(location).astype(np.float64)

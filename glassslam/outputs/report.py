@@ -93,6 +93,7 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "dropped": dict(statistics.scans_dropped),
         },
         "messages_dropped": dict(statistics.messages_dropped),
+        "damage": [asdict(damage) for damage in statistics.damage],
         "recording_seconds": statistics.recording_seconds,
         "distance_m": distance_travelled(result.trajectory),
         "nodes": statistics.nodes,
@@ -103,6 +104,7 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "rejected": dict(statistics.closures_rejected),
         },
         "constraints": dict(sorted(Counter(constraint.kind for constraint in result.constraints).items())),
+        "solver_failures": statistics.solver_failures,
         "residuals": dict(statistics.residuals),
         "map": {
             "resolution": result.map.resolution,

@@ -7,6 +7,7 @@ from glassslam.outputs.calibration_file import CALIBRATION_FILE, write_learnt
 from glassslam.outputs.directory import staged_directory
 from glassslam.outputs.g2o import write_g2o
 from glassslam.outputs.glass_geojson import write_glass
+from glassslam.outputs.html_report import write_html_report
 from glassslam.outputs.labels import write_labels
 from glassslam.outputs.map_server import write_map
 from glassslam.outputs.picture import write_picture
@@ -61,11 +62,12 @@ def write_results(
             folder / "report.json",
         ]
         (folder / "config.yaml").write_text(result.config.dump(), encoding="utf-8")
-        # The report comes last: it tells what everything before it has cost.
+        # The report comes last, but for the page made of it: it tells what everything before it has cost.
         report = build_report(result, stopwatch.read() if stopwatch else None)
         (folder / "report.json").write_text(
             json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8"
         )
+        written.append(write_html_report(result, report, folder))
     return [target / path.name for path in written]
 
 

@@ -8,6 +8,9 @@ import numpy as np
 from glassslam.errors import GlassSlamError
 from glassslam.records import FloatArray
 
+_LARGEST = 1e100
+"""Larger numbers are no measurements, and have no square."""
+
 
 def read_text(path: str | Path, error: type[GlassSlamError]) -> str:
     """Content of a UTF-8 text file.
@@ -41,6 +44,8 @@ def parse_numbers(fields: list[str], where: str, error: type[GlassSlamError]) ->
             number = math.nan
         if not math.isfinite(number):
             raise error(f"{where}: {field!r:.40} is not a finite number")
+        if abs(number) > _LARGEST:
+            raise error(f"{where}: {field!r:.40} is out of all proportion")
         numbers.append(number)
     return numbers
 

@@ -190,7 +190,8 @@ class PoseGraph:
         Raises
         ------
         GraphError
-            Unknown solver or loss, or poses so far apart that the cost is not finite.
+            Unknown solver or loss, poses so far apart that the cost is not finite, or a solution that is not
+            finite; the poses are then those of before.
         """
         self._robust = Robust(loss, float(huber_scale))
         system = System(self._analysed(), self._edges, self._robust)
@@ -205,6 +206,8 @@ class PoseGraph:
             solution = interior_point.minimise(system, poses, max_iterations, tolerance)
         else:
             raise GraphError(f"unknown solver {solver!r}", "known are lm, casadi")
+        if not np.isfinite(solution.poses).all():
+            raise GraphError("the solver found poses that are not finite", "those of before are kept")
         self._accept(solution.poses)
         norms = np.sqrt(np.sum(self.residuals() ** 2, axis=1))
         return OptimizationReport(

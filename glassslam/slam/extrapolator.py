@@ -11,7 +11,7 @@ from glassslam.slam.odometry_track import OdometryTrack, YawTrack
 
 _LONGEST_STEP = 0.6
 _SHORTEST_STEP = 0.01
-_LARGEST_JUMP, _FASTEST = 3.0, 15.0
+_LARGEST_JUMP, _FASTEST, _FARTHEST = 3.0, 15.0, 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,8 @@ class PoseExtrapolator:
         if now is None or self._odometry_pose is None:
             return None
         motion = between(self._odometry_pose, now)
-        if math.hypot(motion[0], motion[1]) > _LARGEST_JUMP + _FASTEST * max(step, 0.0):
+        # however long a recording was silent: such a step would tear the map apart if it were wrong
+        if math.hypot(motion[0], motion[1]) > min(_LARGEST_JUMP + _FASTEST * max(step, 0.0), _FARTHEST):
             self.jumps += 1
             return None
         return motion

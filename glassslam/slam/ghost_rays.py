@@ -19,7 +19,7 @@ def visible_rays(
     """Returns (h, 2) and ends of free space (f, 2) of every node, frame of its base, m.
 
     The ray of a return that is left out ends as free space at the first wall it crosses. Where nothing seen
-    through glass is kept, silent rays end there as well.
+    through glass is kept, silent rays end there as well. Ends of free space begin with those of silent rays.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from glassslam.config import GlassConfig
 from glassslam.errors import RecordingError
 from glassslam.records import LaserScan
+from glassslam.slam.glass_locks import locks_submaps
 
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
     from detectors.calibration import Calibration
@@ -14,6 +15,7 @@ if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
 
 _ENOUGH_NODES = 60
 _FEW_NODES = 20
+_MOST_NODES = 2000
 _ENOUGH_SCANS = 2000
 _STRIDE = 10
 _BY_INTENSITY = ("auto", "intensity_peak", "wang_wang", "calibrated_peak")
@@ -37,6 +39,8 @@ class DetectorChoice:
         Why the detector is in use, or why there is none; one line.
     calibration : Calibration or None
         What `auto` has learnt about the sensor.
+    wants_nodes_only : bool
+        Whether the decision waits for more nodes, and for nothing but nodes.
     """
 
     def __init__(self, config: GlassConfig) -> None:
@@ -47,7 +51,7 @@ class DetectorChoice:
         self.detect: Detector | None = None
         self.name, self.reason = "off", "not asked for"
         self.calibration: Calibration | None = None
-        self.is_pending = self._waits()
+        self.is_pending, self.wants_nodes_only = self._waits(), False
         self._verdict_due = config.detector in _BY_INTENSITY
         if config.detector != "off" and not self.is_pending:
             self._use(config.detector, "asked for")
@@ -68,7 +72,7 @@ class DetectorChoice:
         elif self._scans % _STRIDE == 0 and len(self._others) < _ENOUGH_NODES:
             self._others.append(scan)
         self._scans += 1
-        if len(self._sample) >= _ENOUGH_NODES or self._scans >= _ENOUGH_SCANS:
+        if self._is_due():
             self.settle()
 
     def settle(self) -> None:
@@ -94,6 +98,30 @@ class DetectorChoice:
         elif self.is_pending:
             self._suit()
         self.is_pending, self._sample, self._others = False, [], []
+
+    def _is_due(self) -> bool:
+        """Whether enough was seen; the more a lidar that calibrates itself has seen, the better it does."""
+        if len(self._sample) < _ENOUGH_NODES and self._scans < _ENOUGH_SCANS:
+            return False
+        if self.wants_nodes_only:
+            return len(self._sample) >= _MOST_NODES
+        may_wait = self.is_pending and self._config.ghosts_in_matching
+        if (
+            may_wait
+            and not locks_submaps(self._config.scheme)
+            and self._is_fine()
+            and not self._uninformative()
+        ):
+            self.wants_nodes_only = True
+            return False
+        return True
+
+    def _is_fine(self) -> bool:
+        """Whether the beams are near enough to each other to show the peak of a pane."""
+        from detectors.self_calibration import COARSEST_STEP  # noqa: PLC0415
+
+        knows = self._config.sensor or self._config.calibration
+        return bool(self._sample) and not knows and abs(self._sample[-1].angle_increment) <= COARSEST_STEP
 
     def _waits(self) -> bool:
         config = self._config
@@ -134,7 +162,7 @@ class DetectorChoice:
         from glassslam.slam.glass_detectors import calibrated  # noqa: PLC0415
 
         self.detect, self.name = calibrated(self.calibration), "calibrated_peak"
-        self.reason = f"calibrated on {len(self._sample)} scans of this recording"
+        self.reason = f"calibrated on {self.calibration.evidence['scans']} scans of this recording"
 
     def _learnt(self) -> "Calibration":
         from detectors.self_calibration import self_calibration  # noqa: PLC0415

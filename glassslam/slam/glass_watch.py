@@ -157,7 +157,7 @@ class GlassWatch:
         place = _Placed(look, is_node, self._node, between(self._node_pose, placed.pose_in_local))
         if self.is_decided:
             self._see(place)
-        else:
+        elif is_node or not self._choice.wants_nodes_only:
             self._waiting.append(place)
         self._choice.add(look.scan, is_node=is_node)
         self._catch_up()

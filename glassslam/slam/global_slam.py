@@ -1,12 +1,14 @@
 """Global SLAM: the pose graph, loop closures found beside local SLAM, and their optimisation."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 
 import numpy as np
 
 from glassslam.config import Config
+from glassslam.errors import GraphError
 from glassslam.geometry import between, compose, inverse
 from glassslam.grid.submap import Submap
 from glassslam.posegraph import PoseGraph
@@ -39,6 +41,8 @@ class GlobalSlam:
         Reason -> searches that gave no closure.
     ambiguous : int
         Closures accepted that say nothing along one direction.
+    solver_failures : int
+        Optimisations that failed and left the poses as they were.
     """
 
     def __init__(self, config: Config, stages: Stages) -> None:
@@ -47,7 +51,7 @@ class GlobalSlam:
         self.graph = PoseGraph()
         self.nodes: list[Node] = []
         self.submaps: list[Submap] = []
-        self.searches = self.ambiguous = 0
+        self.searches = self.ambiguous = self.solver_failures = 0
         self.rejected: Counter[str] = Counter()
         self._travel: list[float] = []
         self._searched = 0
@@ -91,7 +95,7 @@ class GlobalSlam:
         self._round(len(self.nodes))
         self._collect()
         limits = self._config.optimization
-        with self._stages.measure("optimisation"):
+        with self._stages.measure("optimisation"), self._keeping_poses():
             prune_closures(
                 self.graph,
                 limits.max_closure_residual,
@@ -100,6 +104,14 @@ class GlobalSlam:
                 huber_scale=limits.huber_scale,
             )
         self._pool.shutdown()
+
+    @contextmanager
+    def _keeping_poses(self) -> Iterator[None]:
+        """Count a failure of the solver, which leaves the poses as they are: they are worth a map."""
+        try:
+            yield
+        except (GraphError, np.linalg.LinAlgError):
+            self.solver_failures += 1
 
     def abandon(self) -> None:
         """Stop the background thread without finishing."""
@@ -168,9 +180,9 @@ class GlobalSlam:
         if not found:
             return
         self.ambiguous += sum(closure.ambiguous for closure in found)
-        roots = [np.linalg.cholesky(np.linalg.inv(closure.covariance)).T for closure in found]
         limits = self._config.optimization
-        with self._stages.measure("optimisation"):
+        with self._stages.measure("optimisation"), self._keeping_poses():
+            roots = [np.linalg.cholesky(np.linalg.inv(closure.covariance)).T for closure in found]
             self.graph.add_constraints(
                 [closure.candidate.anchor for closure in found],
                 [closure.candidate.node for closure in found],

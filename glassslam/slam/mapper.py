@@ -1,6 +1,7 @@
 """The mapper: records in, a map out."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +15,9 @@ from glassslam.slam.glass_watch import GlassWatch
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalResult, LocalSlam, prepared
 from glassslam.slam.range_data import prepare
-from glassslam.slam.render import Rendering, render_run
-from glassslam.slam.result import MapResult
-from glassslam.slam.scan_check import defect, mended, sweep_time
+from glassslam.slam.render import Rendering, render, render_run
+from glassslam.slam.result import MapResult, OccupancyMap
+from glassslam.slam.scan_check import checked_mount, defect, mended, sweep_time
 from glassslam.slam.scan_queue import ScanQueue, TimedScan
 from glassslam.slam.stopwatch import Stages
 from glassslam.slam.tally import Tally, run_statistics
@@ -50,7 +51,7 @@ class Mapper:
 
     def __init__(self, config: Config | None = None, base_from_laser: object = (0.0, 0.0, 0.0)) -> None:
         self._config = config or Config()
-        self._base_from_laser = np.array(base_from_laser, dtype=np.float64)
+        self._base_from_laser = checked_mount(base_from_laser)
         self._stages = Stages()
         self._extrapolator = PoseExtrapolator()
         self._waiting = ScanQueue(self._extrapolator.odometry)
@@ -134,6 +135,12 @@ class Mapper:
         with self._stages.measure("rendering"):
             rendering = render_run(self._global, layer, self._config, closed=len(glass_sources) > 0)
         return self._result(rendering, tracks, info)
+
+    def returns_map(self) -> OccupancyMap:
+        """Map of a run that is settled, in which beams without echo clear nothing."""
+        world = self._global
+        nodes = [replace(node, free_ends=node.free_ends[:0]) for node in world.nodes]
+        return render(nodes, world.poses, self._config.map)
 
     def close(self) -> None:
         """Stop background work; without `finish` this gives the run up."""

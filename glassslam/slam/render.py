@@ -1,8 +1,8 @@
 """The finished map: every node entered once more at its optimised pose, and the glass in its cells."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,21 @@ from glassslam.config import Config, MapConfig
 from glassslam.geometry import compose, inverse, transform_points
 from glassslam.glass.layer import GlassLayer, locked, wall_cells
 from glassslam.grid.probability_grid import OddsModel, ProbabilityGrid
-from glassslam.records import FloatArray
+from glassslam.records import Float32Array, FloatArray
 from glassslam.slam.ghost_rays import visible_rays
 from glassslam.slam.glass_locks import locks_submaps
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.node import Node
 from glassslam.slam.paint import paint_submaps
 from glassslam.slam.result import OccupancyMap
+from glassslam.slam.silence import occupied_where_silent
 
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
     from glassslam.glass.ghosts import Ghosts, Kept
 
-_OCCUPIED = 0.65
+Rays: TypeAlias = tuple[Float32Array, Float32Array]
+
+_OCCUPIED, _FREE = 0.65, 0.196
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +71,7 @@ def render_run(
         return Rendering(grid, grid, None)
     shut = None
     if closed:
-        shut = _locked(render(world.nodes, world.poses, config.map, glass.ghosts, "none"), glass)
+        shut = _locked(_closed(world, glass, config.map), glass)
     if locks_submaps(config.glass.scheme):
         first = [submap.nodes[0] for submap in world.submaps]
         local = np.array([world.nodes[k].pose_in_local for k in first])
@@ -107,9 +110,14 @@ def render(
     kept : {"all", "seen_through", "none"}
         Which of these are shown; the rays of the others end as free space at the wall.
     """
+    return _drawn(nodes, poses, config, visible_rays(nodes, ghosts, kept))
+
+
+def _drawn(nodes: Sequence[Node], poses: FloatArray, config: MapConfig, rays: Iterable[Rays]) -> OccupancyMap:
+    """Map of what the nodes hit and clear."""
     odds = OddsModel(config.hit_probability, config.miss_probability)
     grid = ProbabilityGrid(config.resolution, odds, silent_stop=_OCCUPIED)
-    for node, pose, (returns, free_ends) in zip(nodes, poses, visible_rays(nodes, ghosts, kept), strict=True):
+    for node, pose, (returns, free_ends) in zip(nodes, poses, rays, strict=True):
         grid.insert(
             transform_points(pose, node.sensor[None])[0],
             transform_points(pose, returns.astype(np.float64)),
@@ -117,6 +125,37 @@ def render(
         )
     grid.finish()
     return OccupancyMap(grid.probability(), config.resolution, (float(grid.origin[0]), float(grid.origin[1])))
+
+
+def _closed(world: GlobalSlam, glass: GlassLayer, config: MapConfig) -> OccupancyMap:
+    """Map in which no beam goes through glass, and silence clears only where it tells of free space."""
+    nodes, poses = world.nodes, world.poses
+    rays = list(visible_rays(nodes, glass.ghosts, "none"))
+    silent = [len(node.free_ends) for node in nodes]
+    parts = [(free[:count], free[count:]) for count, (_, free) in zip(silent, rays, strict=True)]
+    bare = _drawn(nodes, poses, config, [(hit, cut) for (hit, _), (_, cut) in zip(rays, parts, strict=True)])
+    opaque = (bare.probability > _OCCUPIED) & ~_near(_wall_mask(bare, glass))
+    heard = [(hit, quiet) for (hit, _), (quiet, _) in zip(rays, parts, strict=True)]
+    if occupied_where_silent(nodes, poses, heard, bare, opaque) < _FREE:
+        return _drawn(nodes, poses, config, rays)
+    # silence says something only where glass explains it
+    kept = _into_glass(silent, glass)
+    clear = [np.concatenate((quiet[keep], cut)) for keep, (quiet, cut) in zip(kept, parts, strict=True)]
+    return _drawn(nodes, poses, config, [(hit, free) for (hit, _), free in zip(rays, clear, strict=True)])
+
+
+def _into_glass(silent: Sequence[int], glass: GlassLayer) -> list[NDArray[np.bool_]]:
+    """Silent beams of every node that run into a glass wall."""
+    if glass.ghosts is None:
+        return [np.zeros(count, dtype=np.bool_) for count in silent]
+    return np.split(glass.ghosts.silent_share < 1.0, np.cumsum(silent)[:-1])
+
+
+def _near(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The cells of a mask and all within two cells of them."""
+    from scipy.ndimage import binary_dilation  # noqa: PLC0415  (only runs with sonars need it)
+
+    return np.asarray(binary_dilation(mask, iterations=2))
 
 
 def _locked(grid: OccupancyMap, layer: GlassLayer) -> OccupancyMap:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from glassslam.config import Config
 from glassslam.glass.layer import GlassLayer
 from glassslam.posegraph.graph import Constraint
-from glassslam.records import Float32Array, FloatArray, RecordingInfo, Trajectory
+from glassslam.records import Damage, Float32Array, FloatArray, RecordingInfo, Trajectory
 from glassslam.slam.trajectory import PoseTracks
 
 
@@ -67,6 +67,10 @@ class RunStatistics:
         Detector in use, "off" without one; why it is in use, or why there is none.
     warnings : list of str
         What a user should know, one line each.
+    damage : list of Damage
+        What of the recording could not be read.
+    solver_failures : int
+        Times the pose graph could not be optimised; the poses of before were kept.
     """
 
     scans_read: int = 0
@@ -84,6 +88,8 @@ class RunStatistics:
     glass_detector: str = "off"
     glass_reason: str = ""
     warnings: list[str] = field(default_factory=list)
+    damage: list[Damage] = field(default_factory=list)
+    solver_failures: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,8 +79,15 @@ def run_statistics(
         residuals=world.residuals(),
         glass_detector=glass.name,
         glass_reason=glass.reason,
-        warnings=[*_warnings(tally, extrapolator, local), *glass.warnings],
+        solver_failures=world.solver_failures,
+        warnings=[*_warnings(tally, extrapolator, local), *_failures(world.solver_failures), *glass.warnings],
     )
+
+
+def _failures(count: int) -> list[str]:
+    """That the map is not as good as it could be."""
+    said = f"the pose graph could not be optimised {count} times: the poses of before were kept"
+    return [said] if count else []
 
 
 def _warnings(tally: Tally, extrapolator: PoseExtrapolator, local: LocalSlam) -> list[str]:

@@ -1,6 +1,7 @@
 """Glass that sonars hear and the lidar map does not show, as oriented pieces of surface."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,6 +23,12 @@ _SHORTEST = 0.1
 _NEAR = 8.0
 _FEWEST_BEAMS = 3
 _PIECE_COLUMNS = 9
+_SIGMA_OF_MEDIAN = 1.48
+# readings this good need no more than the configured span
+_QUIET = 0.02
+# readings worse than this are those of no surface
+_LOUDEST = 0.06
+_SPREAD = 1.5
 
 
 def sonar_glass_observations(
@@ -55,10 +62,11 @@ def sonar_glass_observations(
     if not len(node_stamps):
         return GlassObservations.empty()
     half_width, sensors = 0.5 * beam_width(sweeps, config), sweeps.sensors
-    found = [
-        _pieces_of(_readings(sweeps, sensors, sonar, config.glass.max_range), half_width, config.glass)
-        for sonar in range(sweeps.ranges.shape[1])
+    readings = [
+        _readings(sweeps, sensors, sonar, config.glass.max_range) for sonar in range(sweeps.ranges.shape[1])
     ]
+    noise = reading_noise(readings, config.glass.max_pause)
+    found = [_pieces_of(rows, half_width, config.glass, noise) for rows in readings]
     pieces = np.concatenate([np.empty((0, _PIECE_COLUMNS)), *found])
     glass = passed_share(pieces, beams, node_poses, config.glass.min_gap) >= config.glass.min_passed_share
     return _bound(pieces[glass], node_stamps, node_poses, config.glass)
@@ -73,14 +81,40 @@ def _readings(sweeps: SonarSweeps, sensors: FloatArray, sonar: int, max_range: f
     return np.column_stack((sweeps.stamps[use], sensors[use, sonar], ranges[use]))
 
 
-def _pieces_of(readings: FloatArray, half_width: float, config: SonarGlassConfig) -> FloatArray:
+def reading_noise(readings: Sequence[FloatArray], max_pause: float) -> float:
+    """Standard deviation of single readings about a surface that the sonar moves past, m, at most 6 cm.
+
+    The second difference of three readings in a row is free of the distance and of the motion; corners are
+    left to the median.
+
+    Parameters
+    ----------
+    readings : sequence of ndarray of float64, shape (n, 5)
+        Echoes of every sonar in time: rows of stamp, x, y, axis and range.
+    max_pause : float
+        Longest time between two of them, s.
+    """
+    bends = [np.empty(0)]
+    for rows in readings:
+        steady = np.diff(rows[:, 0]) <= max_pause
+        bends.append(np.diff(rows[:, 4], n=2)[steady[1:] & steady[:-1]])
+    every = np.abs(np.concatenate(bends))
+    noise = float(_SIGMA_OF_MEDIAN * np.median(every) / math.sqrt(6.0)) if every.size else 0.0
+    return min(noise, _LOUDEST)
+
+
+def _pieces_of(
+    readings: FloatArray, half_width: float, config: SonarGlassConfig, noise: float = 0.0
+) -> FloatArray:
     """Pieces of one sonar: rows of stamp, sensor x, y, normal, range, sigmas, half extent, readings."""
+    # evenly spread over a span s, readings tell the normal to noise / s^1.5
+    longer = max(noise / _QUIET, 1.0) ** (2.0 / 3.0)
     table = np.empty((len(readings) + 2, COLUMNS))
     axis_sigma = half_width / math.sqrt(3.0)
     weight = (_LEAST_READING_SIGMA / axis_sigma) ** 2
     count = surface_pieces(
-        readings, weight, half_width, config.max_pause, config.max_span, config.max_residual,
-        config.min_readings, table,
+        readings, weight, half_width, config.max_pause, config.max_span * longer,
+        max(config.max_residual, _SPREAD * noise), config.min_readings, table,
     )  # fmt: skip
     rows = np.empty((count, _PIECE_COLUMNS))
     for k, (first, last, normal, distance, rms, spread, low, high) in enumerate(table[:count]):

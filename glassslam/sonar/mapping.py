@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from glassslam.config import SonarConfig
+from glassslam.grid.probability_grid import check_size
 from glassslam.records import FloatArray
 from glassslam.slam.result import OccupancyMap
 from glassslam.sonar.cone_kernels import enter_centre_lines, enter_masses, enter_means, enter_odds
@@ -91,6 +92,8 @@ def _extent(readings: FloatArray, resolution: float) -> tuple[FloatArray, tuple[
     reach = np.maximum(readings[:, 3], readings[:, 4] + readings[:, 5])[:, None]
     low = np.floor((readings[:, :2] - reach).min(axis=0) / resolution) - _MARGIN_CELLS
     high = np.floor((readings[:, :2] + reach).max(axis=0) / resolution) + 1 + _MARGIN_CELLS
+    width, height = (high - low).tolist()
+    check_size(width, height, resolution)
     columns, rows = (high - low).astype(np.int64).tolist()
     return low * resolution, (rows, columns)
 

@@ -1,9 +1,10 @@
 """Sonar sweeps with the poses at which they were made."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glassslam.errors import GridError
 from glassslam.geometry import compose
@@ -52,6 +53,11 @@ class SonarSweeps:
     def sensors(self) -> FloatArray:
         """Poses of all sonars at all sweeps in the map frame, shape (m, n, 3)."""
         return compose(self.poses[:, None, :], np.asarray(self.ring.poses, dtype=np.float64)[None])
+
+    def only(self, sonars: NDArray[np.int64]) -> "SonarSweeps":
+        """The sweeps of some sonars of the ring, by their numbers, shape (k,)."""
+        ring = replace(self.ring, poses=np.asarray(self.ring.poses)[sonars])
+        return SonarSweeps(self.stamps, self.ranges[:, sonars], ring, self.poses)
 
 
 def placed_sweeps(

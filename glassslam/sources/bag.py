@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
+from glassslam.records import Damage
 from glassslam.sources.formats import Format, Piece
 
 if TYPE_CHECKING:
@@ -51,12 +52,19 @@ class Bag(Protocol):
         Everything recorded.
     start, end : int
         Record times of the first and last message, ns; `end < start` when there is none.
+    damage : tuple of Damage
+        What could not be read so far: what was seen at opening, and what each reading adds.
     """
 
     piece: Piece
     topics: tuple[Topic, ...]
     start: int
     end: int
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        ...
 
     def messages(
         self, topics: Collection[Topic], start: int | None = None, stop: int | None = None
@@ -73,21 +81,21 @@ class Bag(Protocol):
         ...
 
 
-def open_bag(piece: Piece) -> Bag:
-    """Open one bag file or directory.
+def open_bag(piece: Piece, *, strict: bool = False) -> Bag:
+    """Open one bag file or directory; what is readable of a damaged one, unless `strict`.
 
     Raises
     ------
     RecordingError
-        The file is damaged, not indexed, or not what it pretends to be.
+        Nothing can be read, the file is not what it pretends to be, or it is damaged and `strict` was said.
     """
     if piece.format == "rosbag1":
         from glassslam.sources.rosbag1 import Ros1Bag  # noqa: PLC0415  (rosbags is loaded for bags only)
 
-        return Ros1Bag(piece)
+        return Ros1Bag(piece, strict=strict)
     from glassslam.sources.rosbag2 import Ros2Bag  # noqa: PLC0415
 
-    return Ros2Bag(piece)
+    return Ros2Bag(piece, strict=strict)
 
 
 def merge_topics(topics: Collection[Topic]) -> tuple[Topic, ...]:

@@ -39,10 +39,12 @@ class BagInspection:
     ----------
     pieces : sequence of Piece
         Consecutive pieces of one recording.
+    strict : bool
+        Whether damage is refused rather than reported.
     """
 
-    def __init__(self, pieces: Sequence[Piece]) -> None:
-        self._pieces = pieces
+    def __init__(self, pieces: Sequence[Piece], *, strict: bool = False) -> None:
+        self._pieces, self._strict = pieces, strict
         self._scans: dict[str, ScanObserver] = {}
         self._odometry: dict[str, OdometryObserver] = {}
         self._imus: dict[str, ImuObserver] = {}
@@ -57,7 +59,7 @@ class BagInspection:
         RecordingError
             A file is damaged.
         """
-        bags = [open_bag(piece) for piece in self._pieces]
+        bags = [open_bag(piece, strict=self._strict) for piece in self._pieces]
         for bag in bags:
             self._read(bag)
         begin, end = min(bag.start for bag in bags), max(bag.end for bag in bags)
@@ -77,6 +79,7 @@ class BagInspection:
             plan=plan,
             dropped=self._dropped,
             warnings=warnings,
+            damage=tuple(damage for bag in bags for damage in bag.damage),
         )
 
     def _read(self, bag: Bag) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from glassslam.records import LaserScan, Record, RecordingInfo
+from glassslam.records import Damage, LaserScan, Record, RecordingInfo
 from glassslam.sources import messages
 from glassslam.sources.bag import MULTI_ECHO, RANGE, Bag, Topic, open_bag
 from glassslam.sources.bagsurvey import Survey, scan_decoder, survey
@@ -27,7 +27,7 @@ def open_bags(pieces: Sequence[Piece], options: SourceOptions) -> "BagRecording"
     NoScansError, UsageError, RecordingError
         As in `open_recording`.
     """
-    bags = [open_bag(piece) for piece in pieces]
+    bags = [open_bag(piece, strict=options.strict) for piece in pieces]
     return BagRecording(bags, survey(bags, options), options)
 
 
@@ -41,6 +41,11 @@ class BagRecording(Recording):
         self._found = found
         self._options = options
         self._scans_seen = 0
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        return tuple(damage for bag in self._bags for damage in bag.damage)
 
     def _stream(self) -> Iterator[Record]:
         self._scans_seen = 0

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from glassslam.errors import RecordingError
+from glassslam.records import Damage
 from glassslam.sources.bag import TF_TYPES, open_bag
 from glassslam.sources.bagsonar import plan_sonar
 from glassslam.sources.failures import reading
@@ -26,7 +27,7 @@ class BagSonarFile(SonarFile):
     """
 
     def __init__(self, piece: Piece, options: SourceOptions) -> None:
-        self._bag = open_bag(piece)
+        self._bag = open_bag(piece, strict=options.strict)
         transforms = [topic for topic in self._bag.topics if topic.msgtype in TF_TYPES]
         with reading(piece.path, piece.format), self._bag.session():
             self._plan = plan_sonar([self._bag], self._bag.topics, transforms, "", options, required=True)
@@ -39,6 +40,11 @@ class BagSonarFile(SonarFile):
         self.path, self.ring, self.topics = piece.path, self._plan.ring, self._plan.names
         self.span = self._bag.start / 1e9, self._bag.end / 1e9
         self.rule, self.warnings = self._plan.rule, self._plan.warnings
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        return self._bag.damage
 
     def records(self, drop: Drop) -> Iterator[SonarRecord]:
         """Readings in the order of the file."""

@@ -8,6 +8,7 @@ import numpy as np
 from glassslam.records import Float32Array, FloatArray
 from glassslam.sources.carmen_kernels import parse_decimals
 from glassslam.sources.messages import BAD_GEOMETRY, BAD_STAMP, NO_BEAMS, UnusableMessageError
+from glassslam.sources.textlines import single
 
 FLASER = "FLASER"
 ROBOTLASER = "ROBOTLASER1"
@@ -132,7 +133,7 @@ def _parse_flaser(line: bytes, reader: NumberReader) -> LaserLine:
     return LaserLine(
         stamp=poses[6],
         logged=_logged(line),
-        ranges=values[1 : 1 + beams].astype(np.float32),
+        ranges=single(values[1 : 1 + beams]),
         intensities=_EMPTY,
         angle_min=angle_min,
         angle_increment=increment,
@@ -157,11 +158,11 @@ def _parse_robotlaser(line: bytes, reader: NumberReader) -> LaserLine:
     poses = values[poses_at:needed].tolist()
     if not increment and beams > 1:
         increment = field_of_view / (beams - 1)
-    remission = values[poses_at - remissions : poses_at].astype(np.float32)
+    remission = single(values[poses_at - remissions : poses_at])
     return LaserLine(
         stamp=poses[-1],
         logged=_logged(line),
-        ranges=values[_HEADER : _HEADER + beams].astype(np.float32),
+        ranges=single(values[_HEADER : _HEADER + beams]),
         intensities=remission if remissions == beams else _EMPTY,
         angle_min=angle_min,
         angle_increment=increment,

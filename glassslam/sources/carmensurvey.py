@@ -165,6 +165,7 @@ class _Surveyor:
         lines = self._lasers(laser.name) if laser else []
         if laser is None or not lines:
             raise NoScansError(f"no usable FLASER or ROBOTLASER1 line in {self._pieces[0].path}")
+        times = times or [(line.stamp, line.logged) for line in lines]  # neither end can be read
         clock = self._clock_offset(times)
         record_times = [stamp if math.isnan(logged + clock) else logged + clock for stamp, logged in times]
         return CarmenSurvey(
@@ -231,9 +232,10 @@ class _Surveyor:
 
     def _base_from_laser(self, lines: Sequence[LaserLine]) -> Pose:
         """The mount of the laser: the two poses in each line, where they differ by a fixed amount."""
-        mount = between(
-            np.array([line.robot_pose for line in lines]), np.array([line.laser_pose for line in lines])
-        )
+        with np.errstate(invalid="ignore", over="ignore"):
+            mount = between(
+                np.array([line.robot_pose for line in lines]), np.array([line.laser_pose for line in lines])
+            )
         mount = mount[np.all(np.isfinite(mount), axis=1)]
         spread = mount - mount[:1]
         spread[:, 2] = wrap_angle(spread[:, 2])

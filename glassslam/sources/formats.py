@@ -74,7 +74,7 @@ def _expand(path: Path) -> tuple[Piece, ...]:
             raise RecordingError(f"{path} does not exist")
         if not path.is_dir():
             return (Piece(path, _detect(path)),)
-        files = sorted((p for p in path.iterdir() if p.suffix in {".mcap", ".db3"}), key=_natural_order)
+        files = sorted((p for p in path.iterdir() if p.suffix in {".mcap", ".db3"}), key=natural_order)
         if (path / "metadata.yaml").exists():
             return (Piece(path, _directory_format(path, files)),)
         if not files:
@@ -84,7 +84,8 @@ def _expand(path: Path) -> tuple[Piece, ...]:
         return tuple(Piece(file, _detect(file)) for file in files)
 
 
-def _natural_order(path: Path) -> list[tuple[int, str]]:
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """Key by which `part_2` comes before `part_10`."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 

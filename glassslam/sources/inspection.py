@@ -37,19 +37,21 @@ def inspect_recording(
     Raises
     ------
     RecordingError
-        A file is missing, empty, foreign, truncated or damaged.
+        A file is missing, empty or foreign; or damaged, and nothing is readable or `strict` was said.
     """
     pieces = resolve([paths] if isinstance(paths, str | Path) else list(paths))
     chosen = SourceOptions() if options is None else options
     recording, plan = _plan(pieces, chosen)
     if recording is not None:
-        report = _report(pieces, plan, tuple(recording.warnings))
+        report = _report(pieces, plan, tuple(recording.warnings), strict=chosen.strict)
         return replace(report, sonars=_of_recording(recording))
     sonars, warnings = _of_files([piece.path for piece in pieces], chosen)
-    return replace(_report(pieces, plan, ()), sonars=sonars, warnings=warnings)
+    return replace(_report(pieces, plan, (), strict=chosen.strict), sonars=sonars, warnings=warnings)
 
 
-def _report(pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...]) -> RecordingReport:
+def _report(
+    pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...], *, strict: bool
+) -> RecordingReport:
     if pieces[0].format == "pimap":
         from glassslam.sources.pimapinspection import inspect_pimap  # noqa: PLC0415
 
@@ -64,7 +66,7 @@ def _report(pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...]) -> R
         return inspect_player(pieces, plan, warnings)
     from glassslam.sources.baginspection import BagInspection  # noqa: PLC0415  (loads rosbags)
 
-    return BagInspection(pieces).run(plan, warnings)
+    return BagInspection(pieces, strict=strict).run(plan, warnings)
 
 
 def _plan(pieces: Sequence[Piece], options: SourceOptions) -> tuple[Recording | None, Plan]:

@@ -154,9 +154,8 @@ def imu(message: Any, record_ns: int, base_from_imu: FloatArray) -> Imu:
         There is no angular velocity, or it is not finite.
     """
     rate = message.angular_velocity
-    yaw_rate = float(
-        base_from_imu[2, 0] * rate.x + base_from_imu[2, 1] * rate.y + base_from_imu[2, 2] * rate.z
-    )
+    x, y, z = base_from_imu[2, :3].tolist()
+    yaw_rate = float(x * rate.x + y * rate.y + z * rate.z)
     # By the convention of the message, -1 here says that the sensor has no gyroscope.
     absent = len(message.angular_velocity_covariance) > 0 and message.angular_velocity_covariance[0] == -1.0
     if absent or not math.isfinite(yaw_rate):

@@ -144,7 +144,7 @@ class ScanObserver:
         near = (ranges < scan.range_min) | (ranges <= 0)
         infinite = np.isposinf(ranges)
         usable = ranges[np.isfinite(ranges) & ~near]
-        bins = np.rint(usable * _BINS_PER_M).astype(np.int64)
+        bins = np.rint(np.minimum(usable, _FARTHEST_M) * _BINS_PER_M).astype(np.int64)
         self._histogram += np.bincount(
             np.minimum(bins, self._histogram.size - 1), minlength=self._histogram.size
         )
@@ -218,8 +218,11 @@ class OdometryObserver:
         """Take in the next pose."""
         self._stamps.add(odometry.stamp, odometry.record_stamp)
         if self._last is not None:
-            self._length += math.dist(self._last[:2], odometry.pose[:2])
-            self._turning += abs(float(wrap_angle(odometry.pose[2] - self._last[2])))
+            length, turn = math.dist(self._last[:2], odometry.pose[:2]), odometry.pose[2] - self._last[2]
+            # a pose that is not finite, or absurdly far away, is no travel
+            if math.isfinite(length) and math.isfinite(turn):
+                self._length += length
+                self._turning += abs(float(wrap_angle(turn)))
         self._last = odometry.pose
 
     def report(self) -> OdometryReport | None:

@@ -38,6 +38,8 @@ class SourceOptions:
         Topics of the sonars by name; None: what looks like sonar. "none" switches sonar off.
     sonar_ring : str, Path or None
         Where the sonars sit: the name of a shipped ring or a YAML file; None: as recorded.
+    strict : bool
+        Refuse a damaged bag; otherwise what is readable of it is read, and `Recording.damage` tells the rest.
 
     Raises
     ------
@@ -56,6 +58,7 @@ class SourceOptions:
     sonar: str | Path | None = None
     sonar_topic: str | tuple[str, ...] | None = None
     sonar_ring: str | Path | None = None
+    strict: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.start) and self.start >= 0):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from glassslam.errors import RecordingError
 from glassslam.records import FloatArray, Trajectory
 from glassslam.sources.failures import reading
+from glassslam.sources.textlines import single
 
 _TICKS_AT_1970 = 621_355_968_000_000_000
 _TICKS_PER_S = 10_000_000
@@ -45,7 +46,7 @@ def read_pimap_sonar(path: str | Path) -> tuple[FloatArray, NDArray[np.float32]]
         The file cannot be read or is no such log.
     """
     seconds, values = _read(Path(path))
-    return _straightened(seconds), values.astype(np.float32)
+    return _straightened(seconds), single(values)
 
 
 def read_pimap_poses(path: str | Path) -> Trajectory:
@@ -83,7 +84,7 @@ def _read(path: Path) -> tuple[FloatArray, FloatArray]:
         ticks = np.array([int(row[_HEADER - 1]) for row in rows], dtype=np.int64)
         values = np.array([row[_HEADER:] for row in rows], dtype=np.float64)
     except (ValueError, OverflowError) as error:
-        raise RecordingError(f"{path} is no pi-map log: {error}") from error
+        raise RecordingError(f"{path} is no pi-map log: {error!s:.80}") from error
     return (ticks - _TICKS_AT_1970) / _TICKS_PER_S, values
 
 

@@ -10,6 +10,7 @@ from glassslam.records import Float32Array, FloatArray
 from glassslam.sources.carmenlines import UNREADABLE_LINE, NumberReader, read_any
 from glassslam.sources.messages import BAD_GEOMETRY, NO_BEAMS, UnusableMessageError
 from glassslam.sources.playerlines import PlayerLine
+from glassslam.sources.textlines import single
 
 Pose: TypeAlias = tuple[float, float, float]
 
@@ -70,7 +71,7 @@ def parse_scan(line: PlayerLine, reader: NumberReader) -> PlayerScan:
 
 
 def _scan_of(values: FloatArray, layout: "_Layout") -> PlayerScan:
-    beams = values[layout.head :].reshape(-1, 2).astype(np.float32)
+    beams = single(values[layout.head :].reshape(-1, 2))
     if len(beams) == 0:
         raise UnusableMessageError(NO_BEAMS)
     angles = values[layout.angles : layout.angles + 3].tolist()
@@ -125,11 +126,11 @@ def parse_sonar(line: PlayerLine, reader: NumberReader) -> tuple[FloatArray | No
     """
     values = _numbers(line, reader, 1).copy()
     if line.kind == "sweep":
-        return None, _counted(values, 1)[0].astype(np.float32)
+        return None, single(_counted(values, 1)[0])
     poses, rest = _counted(values, 3)
     if line.kind == "ring":
         return poses.reshape(-1, 3), None
-    return poses.reshape(-1, 3), _counted(rest, 1)[0].astype(np.float32)
+    return poses.reshape(-1, 3), single(_counted(rest, 1)[0])
 
 
 def parse_ranges(line: PlayerLine, reader: NumberReader) -> tuple[Float32Array, FloatArray]:
@@ -141,7 +142,7 @@ def parse_ranges(line: PlayerLine, reader: NumberReader) -> tuple[Float32Array, 
         The line is cut off.
     """
     ranges, rest = _counted(_numbers(line, reader, 1).copy(), 1)
-    return ranges.astype(np.float32), rest
+    return single(ranges), rest
 
 
 def parse_elements(line: PlayerLine, reader: NumberReader) -> tuple[Pose, FloatArray]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from glassslam.errors import NoScansError
-from glassslam.records import LaserScan, Record, RecordingInfo
+from glassslam.records import Damage, LaserScan, Record, RecordingInfo
 from glassslam.sources.formats import Piece, resolve
 from glassslam.sources.options import UNUSED, SourceOptions
 from glassslam.sources.sweeps import SweepRule
@@ -43,6 +43,11 @@ class Recording(ABC):
         self.dropped: dict[str, int] = {}
         self.warnings: list[str] = list(warnings)
 
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far: what opening has shown, and what iterating adds."""
+        return ()
+
     def records(self) -> Iterator[Record]:
         """Stream the records in the order of the recording; each call starts anew.
 
@@ -56,7 +61,7 @@ class Recording(ABC):
         NoScansError
             The end was reached without a single usable scan.
         RecordingError
-            The file is damaged.
+            The file is damaged, and `SourceOptions.strict` was said or nothing more can be read.
         """
         self.dropped.clear()
         scans = 0
@@ -97,7 +102,7 @@ def open_recording(
     Raises
     ------
     RecordingError
-        A file is missing, empty, foreign, truncated or damaged.
+        A file is missing, empty or foreign; or damaged, and nothing is readable or `strict` was said.
     NoScansError
         There is no laser scan in it.
     UsageError

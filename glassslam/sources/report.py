@@ -4,6 +4,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from glassslam.records import Damage
 from glassslam.sources.sonarreport import SonarReport, StampReport
 from glassslam.sources.transforms import Pose2
 
@@ -162,6 +163,8 @@ class RecordingReport:
         What a user should know.
     sonars : tuple of SonarReport
         The ring and the 3D sensors.
+    damage : tuple of Damage
+        What could not be read.
     """
 
     paths: tuple[str, ...]
@@ -178,6 +181,7 @@ class RecordingReport:
     dropped: dict[str, int]
     warnings: tuple[str, ...]
     sonars: tuple[SonarReport, ...] = ()
+    damage: tuple[Damage, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; infinite and undefined numbers become the strings "inf", "-inf" and "nan"."""

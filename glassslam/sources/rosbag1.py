@@ -11,18 +11,22 @@ from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag1 import Reader
-from rosbags.rosbag1.reader import Chunk
 
 from glassslam.errors import RecordingError
+from glassslam.records import Damage
 from glassslam.sources.bag import SONAR_TYPES, USED_TYPES, Decoder, Raw, Topic, merge_topics, typestore_for
-from glassslam.sources.failures import reading
+from glassslam.sources.failures import DAMAGED_HINT, REPAIR_TOOLS, reading
 from glassslam.sources.formats import Piece
+from glassslam.sources.gaps import shortened
+from glassslam.sources.rosbag1index import BagIndex, Chunk, read_index
+from glassslam.sources.unpacking import Content, unpack
 
 # One chunk in use, one ahead, and two for topics whose chunks do not run in step.
 _CHUNKS_KEPT = 4
 _MESSAGE_RECORD = b"op=\x02"
 _TIME, _CHUNK, _OFFSET = 0, 1, 2
+
+DAMAGED = DAMAGED_HINT.format(tool=REPAIR_TOOLS["rosbag1"])
 
 _unpack_u32 = struct.Struct("<I").unpack_from
 
@@ -35,17 +39,27 @@ class Ros1Bag:
     Topics are merged by record time, so a file written topic after topic is read in step.
     """
 
-    def __init__(self, piece: Piece) -> None:
+    def __init__(self, piece: Piece, *, strict: bool = False) -> None:
         self.piece = piece
-        with reading(piece.path, piece.format), Reader(piece.path) as reader:
-            self.topics = merge_topics([Topic(c.topic, c.msgtype, c.msgcount) for c in reader.connections])
-            self.start, self.end = reader.start_time, reader.end_time - 1
-            self._chunks: dict[int, Chunk] = dict(reader.chunks)
-            self._store = typestore_for(reader.connections, "rosbag1")
+        self._strict = strict
+        index = _index_of(piece, strict=strict)
+        with reading(piece.path, piece.format):
+            self.topics = merge_topics([Topic(c.topic, c.msgtype, c.msgcount) for c in index.connections])
+            self.start, self.end = index.start, index.end
+            self._chunks = index.chunks
+            self._store = typestore_for(index.connections, "rosbag1")
             self._index: dict[tuple[str, str], NDArray[np.int64]] = {}
             for topic in self.topics:
                 if topic.msgtype in (*USED_TYPES, *SONAR_TYPES):
-                    self._index[topic.name, topic.msgtype] = _file_order(reader, topic)
+                    self._index[topic.name, topic.msgtype] = _file_order(index, topic)
+        self._found_damaged = index.damage
+        self._chunks_damaged: dict[int, Damage] = {}
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        chunks = (self._chunks_damaged[key] for key in sorted(self._chunks_damaged))
+        return shortened([*self._found_damaged, *chunks])
 
     def decoder(self, msgtype: str) -> Decoder:
         """The function that turns a serialised message of this type into an object."""
@@ -69,10 +83,37 @@ class Ros1Bag:
             turns = np.flatnonzero(np.diff(plan[:, _CHUNK], prepend=-1, append=-1))
             for first, last in pairwise(turns.tolist()):
                 following = int(plan[last, _CHUNK]) if last < len(plan) else None
-                chunk = loader.load(int(plan[first, _CHUNK]), following)
+                position = int(plan[first, _CHUNK])
+                chunk = loader.load(position, following)
+                if chunk.problem:
+                    self._note(position, chunk.problem, len(chunk.data))
                 times, offsets = plan[first:last, _TIME].tolist(), plan[first:last, _OFFSET].tolist()
                 for time, offset, k in zip(times, offsets, owner[first:last].tolist(), strict=True):
-                    yield chosen[k], time, _message_at(chunk, offset)
+                    try:
+                        raw = _message_at(chunk.data, offset)
+                    except (RecordingError, struct.error):
+                        self._note(position, chunk.problem or "the index and a chunk disagree", offset)
+                    else:
+                        yield chosen[k], time, raw
+
+    def _note(self, position: int, reason: str, offset: int) -> None:
+        """Remember that a chunk cannot be read from an offset in its content on."""
+        if self._strict:
+            raise RecordingError(f"cannot read {self.piece.path}: {reason}", DAMAGED)
+        rows = np.concatenate(list(self._index.values()))
+        lost = rows[(rows[:, _CHUNK] == position) & (rows[:, _OFFSET] >= offset)]
+        if position in self._chunks_damaged or not len(lost):
+            return
+        times, chunk = lost[:, _TIME] / 1e9, self._chunks[position]
+        self._chunks_damaged[position] = Damage(
+            file=str(self.piece.path),
+            offset=position,
+            bytes=chunk.data + chunk.size - position,
+            first_stamp=float(times.min()),
+            last_stamp=float(times.max()),
+            messages_lost=len(lost),
+            reason=reason,
+        )
 
     def _plan(
         self, topics: list[Topic], start: int | None, stop: int | None
@@ -100,7 +141,7 @@ class _ChunkLoader:
     def __init__(self, piece: Piece, chunks: dict[int, Chunk]) -> None:
         self._piece = piece
         self._chunks = chunks
-        self._kept: OrderedDict[int, Future[bytes]] = OrderedDict()
+        self._kept: OrderedDict[int, Future[Content]] = OrderedDict()
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="bag-chunks")
         self._file: BinaryIO = piece.path.open("rb")
 
@@ -111,14 +152,14 @@ class _ChunkLoader:
         self._pool.shutdown(wait=True, cancel_futures=True)
         self._file.close()
 
-    def load(self, position: int, following: int | None) -> bytes:
+    def load(self, position: int, following: int | None) -> Content:
         """The content of the chunk at a file position; `following` is started in the background."""
         wanted = self._request(position)
         if following is not None:
             self._request(following)
         return wanted.result()
 
-    def _request(self, position: int) -> Future[bytes]:
+    def _request(self, position: int) -> Future[Content]:
         if position not in self._kept:
             self._kept[position] = self._pool.submit(self._read, self._chunks[position])
         self._kept.move_to_end(position)
@@ -126,22 +167,39 @@ class _ChunkLoader:
             self._kept.popitem(last=False)
         return self._kept[position]
 
-    def _read(self, chunk: Chunk) -> bytes:
-        self._file.seek(chunk.datapos)
-        data = self._file.read(chunk.datasize)
-        if len(data) != chunk.datasize:
+    def _read(self, chunk: Chunk) -> Content:
+        self._file.seek(chunk.data)
+        data = self._file.read(chunk.size)
+        if len(data) != chunk.size:
             raise RecordingError(f"cannot read {self._piece.path}: a chunk is cut off")
-        return chunk.decompressor(data)
+        return unpack(data, chunk.compression, chunk.claimed)
 
 
-def _file_order(reader: Reader, topic: Topic) -> NDArray[np.int64]:
+def _index_of(piece: Piece, *, strict: bool) -> BagIndex:
+    """Where the messages are: by the index, else by reading the whole file once."""
+    try:
+        with reading(piece.path, piece.format):
+            return read_index(piece.path)
+    except RecordingError:
+        if strict:
+            raise
+        from glassslam.sources.rosbag1scan import scan_bag  # noqa: PLC0415  (for damaged bags only)
+
+        with reading(piece.path, piece.format):
+            index = scan_bag(piece.path)
+        if not any(index.rows.values()):
+            raise
+        return index
+
+
+def _file_order(index: BagIndex, topic: Topic) -> NDArray[np.int64]:
     """Index rows (record time ns, chunk position, offset) of a topic, as the file holds its messages."""
     rows = np.array(
         [
-            tuple(entry)
-            for connection in reader.connections
+            entry
+            for connection in index.connections
             if (connection.topic, connection.msgtype) == (topic.name, topic.msgtype)
-            for entry in reader.indexes[connection.id]
+            for entry in index.rows.get(connection.id, ())
         ],
         dtype=np.int64,
     ).reshape(-1, 3)

@@ -3,56 +3,89 @@
 from collections.abc import Collection, Generator, Iterator
 from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from typing import Protocol
-from urllib.parse import quote
 
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.metadata import ReaderMetadata
-from rosbags.rosbag2.storage_mcap import McapReader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from glassslam.errors import RecordingError
+from glassslam.records import Damage
 from glassslam.sources.bag import Decoder, Raw, Topic, merge_topics, typestore_for
 from glassslam.sources.failures import DAMAGED_HINT, REPAIR_TOOLS, reading
 from glassslam.sources.formats import Piece
+from glassslam.sources.gaps import shortened
+from glassslam.sources.rosbag2files import (
+    Directory,
+    Files,
+    directory_files,
+    file_storage,
+    metadata_damage,
+)
 
-_SQLITE_HEADER = 100
 
+class Storage(Protocol):
+    """What a file and a directory have in common.
 
-class _Storage(Protocol):
-    """What the storage classes of rosbags have in common."""
+    Attributes
+    ----------
+    connections : list of Connection
+        Topics, types and definitions, with the number of messages; empty while closed.
+    metadata : ReaderMetadata
+        Times and number of all messages.
+    """
 
     connections: list[Connection]
     metadata: ReaderMetadata
 
-    def open(self) -> None: ...
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        ...
 
-    def close(self) -> None: ...
+    def open(self) -> None:
+        """Open the files."""
+        ...
+
+    def close(self) -> None:
+        """Close the files."""
+        ...
 
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Generator[tuple[Connection, int, bytes], None, None]: ...
+    ) -> Generator[tuple[Connection, int, bytes], None, None]:
+        """Connection, record time in ns and serialised message."""
+        ...
 
 
 class Ros2Bag:
     """A ROS2 bag; see `Bag`. Messages come in the order of their record times."""
 
-    def __init__(self, piece: Piece) -> None:
+    def __init__(self, piece: Piece, *, strict: bool = False) -> None:
         self.piece = piece
-        self._storage = _storage(piece)
+        self._storage = _storage(piece, strict=strict)
         self._depth = 0
         with self.session():
             foreign = {c.msgtype for c in self._storage.connections if not _is_cdr(c)}
             self.topics = merge_topics(
-                [Topic(c.topic, c.msgtype, c.msgcount) for c in self._storage.connections if _is_cdr(c)]
+                [
+                    # metadata written by hand may name a topic by what YAML takes for a number
+                    Topic(str(c.topic), str(c.msgtype), c.msgcount)
+                    for c in self._storage.connections
+                    if _is_cdr(c)
+                ]
             )
             if foreign and not self.topics:
                 raise RecordingError(f"{piece.path}: no message is serialised as CDR")
             metadata = self._storage.metadata
             self.start, self.end = metadata.start_time, metadata.end_time - 1
             self._store = typestore_for(self._storage.connections, piece.format)
+        if strict and self.damage:
+            raise RecordingError(self.damage[0].text, DAMAGED_HINT.format(tool=REPAIR_TOOLS[piece.format]))
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        return shortened(self._storage.damage)
 
     @contextmanager
     def session(self) -> Iterator[None]:
@@ -85,31 +118,22 @@ class Ros2Bag:
                 yield wanted[connection.topic, connection.msgtype], time, raw
 
 
-def _storage(piece: Piece) -> _Storage:
-    with reading(piece.path, piece.format):
-        if piece.path.is_dir():
-            for file in piece.path.glob("*.db3"):
-                _check_size(file)
-            return Reader(piece.path).storage
-        if piece.format == "rosbag2-mcap":
-            return McapReader(piece.path)
-        _check_size(piece.path)
-        # The path becomes part of a URI, in which '?', '#' and '%' have a meaning.
-        return Sqlite3Reader(Path(quote(str(piece.path))))
-
-
-def _check_size(path: Path) -> None:
-    """SQLite reads a file that is cut off as long as it does not touch the missing pages."""
-    with path.open("rb") as file:
-        header = file.read(_SQLITE_HEADER)
-    page_size, pages = int.from_bytes(header[16:18], "big"), int.from_bytes(header[28:32], "big")
-    # The largest page size does not fit into its two bytes and is written as 1.
-    missing = pages * (page_size if page_size > 1 else 65536) - path.stat().st_size
-    if missing > 0:
-        raise RecordingError(
-            f"cannot read {path}: the last {missing} bytes are missing",
-            DAMAGED_HINT.format(tool=REPAIR_TOOLS["rosbag2-sqlite3"]),
-        )
+def _storage(piece: Piece, *, strict: bool) -> Storage:
+    if not piece.path.is_dir():
+        return file_storage(piece.path, piece.format, strict=strict)
+    try:
+        with reading(piece.path, piece.format):
+            directory = Directory(piece.path, strict=strict)
+            directory.open()
+            damaged = bool(directory.damage)
+            packed = directory.metadata.compression_mode == "message"
+            directory.close()
+    except RecordingError as error:
+        if strict or not directory_files(piece):
+            raise
+        return Files(directory_files(piece), piece.format, [metadata_damage(piece, error)])
+    # Counts and times of the metadata hold no longer; and packed messages are unpacked within bounds there.
+    return Files(directory_files(piece), piece.format, ()) if damaged or packed else directory
 
 
 def _is_cdr(connection: Connection) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from glassslam.errors import RecordingError, UsageError
-from glassslam.records import Record, SonarRing
+from glassslam.records import Damage, Record, SonarRing
 from glassslam.sources.formats import Piece, resolve
 from glassslam.sources.options import SourceOptions
 from glassslam.sources.recording import Recording
@@ -44,6 +44,11 @@ class SonarFile(ABC):
     span: tuple[float, float]
     rule: SweepRule | None = None
     warnings: tuple[str, ...] = ()
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read so far."""
+        return ()
 
     @abstractmethod
     def records(self, drop: Drop) -> Iterator[SonarRecord]:
@@ -129,6 +134,11 @@ class MergedRecording(Recording):
         super().__init__(info, (*inner.warnings, *sonar.warnings), inner.span, sonar.rule)
         inner.warnings, inner.dropped = self.warnings, self.dropped
         self._inner, self._sonar = inner, sonar
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read of both so far."""
+        return (*self._inner.damage, *self._sonar.damage)
 
     def _stream(self) -> Iterator[Record]:
         inner = self._inner.records()

@@ -25,8 +25,8 @@ def matrix_of(transform: Any) -> FloatArray | None:
     """Homogeneous matrix (4, 4) of a geometry_msgs/Transform; None when it is no rigid motion."""
     t, q = transform.translation, transform.rotation
     values = np.array([t.x, t.y, t.z, q.x, q.y, q.z, q.w], dtype=np.float64)
-    norm = math.sqrt(float(values[3:] @ values[3:])) if np.all(np.isfinite(values)) else 0.0
-    if norm < 1e-6:
+    norm = math.hypot(*values[3:].tolist()) if np.all(np.isfinite(values)) else 0.0
+    if not 1e-6 < norm < math.inf:
         return None
     x, y, z, w = (values[3:] / norm).tolist()
     matrix = np.eye(4)

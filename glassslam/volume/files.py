@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from glassslam.errors import OutputError, UsageError
@@ -44,7 +45,7 @@ def write_volume(
     also: Callable[[Path], list[Path]] | None = None,
     overwrite: bool = False,
 ) -> list[Path]:
-    """Write `VOLUME_FILES`; each appears whole or not at all.
+    """Write `VOLUME_FILES`, all of them or none.
 
     Parameters
     ----------
@@ -77,18 +78,39 @@ def write_volume(
         lambda path: write_top_view(tree, path, band),
         lambda path: write_slices(tree, path, band),
     )
+    made = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:
         target.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".volume.", dir=target) as staged:
             paths = [write(Path(staged) / name) for name, write in zip(VOLUME_FILES, writers, strict=True)]
             paths += also(Path(staged)) if also else []
-            return [_publish(path, target / path.name) for path in paths]
-    except OSError as error:
-        raise OutputError(f"cannot write {directory}: {error.strerror or error}") from error
+            return _publish(paths, target)
+    except BaseException as error:
+        for folder in made:
+            with suppress(OSError):  # it is not empty: others have written there meanwhile
+                folder.rmdir()
+        if isinstance(error, OSError):
+            raise OutputError(f"cannot write {directory}: {error.strerror or error}") from error
+        raise
 
 
-def _publish(staged: Path, final: Path) -> Path:
-    with staged.open("rb") as file:
-        os.fsync(file.fileno())
-    staged.replace(final)
-    return final
+def _publish(staged: list[Path], target: Path) -> list[Path]:
+    """Put finished files in their places, all of them or none."""
+    for path in staged:
+        with path.open("rb") as file:
+            os.fsync(file.fileno())
+    finals = [target / path.name for path in staged]
+    kept = {final: path.with_name(f"{path.name}.old") for final, path in zip(finals, staged, strict=True)}
+    try:
+        for path, final in zip(staged, finals, strict=True):
+            if final.exists():
+                final.rename(kept[final])
+            path.rename(final)
+    except BaseException:
+        for path, final in zip(staged, finals, strict=True):
+            if not path.exists():
+                final.unlink(missing_ok=True)
+            if kept[final].exists():
+                kept[final].rename(final)
+        raise
+    return finals

@@ -93,7 +93,7 @@ def test_the_map_may_lie_in_another_frame(angle, x, y):
 
 @given(st.floats(0, np.pi))
 def test_the_length_of_a_line_hardly_depends_on_its_direction(angle):
-    """Steps from row to row add a little, up to an eighth."""
+    """Steps from row to row add up to an eighth; thinning a diagonal takes up to a fifth."""
     end = np.array([3.0 * np.cos(angle), 5.0 + 3.0 * np.sin(angle)])
     errors = evaluate_glass_cells(line((0, 5), end), [], resolution=CELL)
-    assert 2.8 < errors.false_length < 1.125 * 3.0 + CELL
+    assert 0.8 * 3.0 < errors.false_length < 1.125 * 3.0 + CELL

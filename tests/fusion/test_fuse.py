@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fusion_worlds import LEFT, ring, sweeps
+from fusion_worlds import LEFT, RIGHT, ring, sweeps
 
 from glassslam.config import FusionConfig, SonarConfig
 from glassslam.errors import UsageError
@@ -149,22 +149,54 @@ class TestRecording:
 class TestByWalls:
     """What the lidar maps, closed at glass walls, with free space that only the sonars know."""
 
-    def fused(self, tiny_result, draw_map, walls):
-        lidar = draw_map("....\n....\n????")
+    def fused(self, tiny_result, draw_map, walls=(), reading=1.25):
+        """A sonar at (0.25, 0.25) looks left, along the first column, and hears something at `reading`."""
+        lidar = draw_map("?...\n?#..\n????\n....")
         layer = GlassLayer(walls, GlassObservations.empty(), np.empty((0, 2)), np.empty(0))
         run = replace(tiny_result, map=lidar, lidar_map=lidar, closed_map=lidar, glass=layer)
-        return by_walls(run, draw_map("????\n????\n.#.?"))
+        heard = sweeps([(0.25, 0.25, 0.0)], ring(LEFT), [[reading]])
+        return by_walls(run, heard, SonarConfig(arc_thickness=0.1))
 
     def wall(self, observations, by_sonar):
-        ends = np.array([0.1, 1.25]), np.array([1.9, 1.25])
+        ends = np.array([0.1, 0.75]), np.array([1.9, 0.75])
         return GlassWall(*ends, observations, 5, 0.99, 0.01, 0.01, 1.0, by_sonar)
 
-    def test_free_space_of_the_sonars_fills_what_the_lidar_did_not_see(self, tiny_result, draw_map):
-        fused = self.fused(tiny_result, draw_map, ())
-        assert fused.source.tolist() == [[2, 0, 2, 0], [1, 1, 1, 1], [1, 1, 1, 1]]
-        assert np.isnan(fused.map.probability[0]).tolist() == [False, True, False, True]
+    @pytest.mark.parametrize(
+        ("reading", "column"), [(0.7, [1, 2, 0, 0]), (1.25, [1, 2, 2, 0]), (np.nan, [1, 0, 0, 0])]
+    )
+    def test_what_the_lidar_did_not_see_is_free_up_to_the_reading(
+        self, tiny_result, draw_map, reading, column
+    ):
+        fused = self.fused(tiny_result, draw_map, reading=reading)
+        assert fused.source[:, 0].tolist() == column
+        assert (~np.isnan(fused.map.probability[:, 0])).tolist() == [number > 0 for number in column]
+
+    def test_nothing_is_cleared_behind_what_is_occupied(self, tiny_result, draw_map):
+        lidar = draw_map("?...\n?...\n#...\n....")
+        run = replace(tiny_result, map=lidar, lidar_map=lidar, closed_map=lidar)
+        heard = sweeps([(0.25, 0.25, 0.0)], ring(LEFT), [[1.8]])
+        assert by_walls(run, heard, SonarConfig()).source[:, 0].tolist() == [1, 1, 0, 0]
 
     @pytest.mark.parametrize(("observations", "by_sonar", "who"), [(9, 0, 1), (9, 9, 2), (9, 4, 3)])
     def test_walls_tell_which_sensors_saw_them(self, tiny_result, draw_map, observations, by_sonar, who):
         fused = self.fused(tiny_result, draw_map, (self.wall(observations, by_sonar),))
-        assert fused.source[2].tolist() == [who] * 4
+        assert fused.source[1].tolist() == [who] * 4
+
+
+def test_two_sonars_can_stand_for_the_ring(tiny_result, draw_map):
+    """The sonar ahead hears a wall; with the sides alone its reading is left out of the sonar map."""
+    grid = draw_map("........")
+    track = Trajectory(np.arange(3.0), np.zeros((3, 3)))
+    run = replace(tiny_result, map=grid, lidar_map=grid, tracks=PoseTracks(track, track, track, track))
+
+    def x_of_walls(sonars):
+        config = SonarConfig.model_validate({"fusion": {"method": "attach", "sonars": sonars}})
+        listener = SonarListener(ring(LEFT, 0.0, RIGHT), SonarConfig())
+        for stamp in (0.0, 0.5, 1.0, 1.5):
+            listener.add(RangeRing(stamp, np.array([1.0, 1.5, 1.0], np.float32)))
+        heard = listener.with_config(config).joined(run).sonar.sonar_map
+        columns = np.flatnonzero((heard.probability > 0.65).any(axis=0))
+        return heard.origin[0] + (columns + 0.5) * heard.resolution
+
+    assert x_of_walls("all").max() == pytest.approx(1.5, abs=0.1)
+    assert x_of_walls("sides").max() < 0.3

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from glassslam.config import FusionConfig
-from glassslam.fusion.layer_kernels import count_ends
+from glassslam.fusion.layer_kernels import clear_rays, count_ends
 from glassslam.fusion.layers import attach, end_point_layer, minmax, pessimistic
 
 NAN = math.nan
@@ -127,3 +127,21 @@ def test_counting_ends_as_the_naive_twin(seed):
     assert passed.tolist() == naive.tolist()
     assert ended.sum() == 6
     assert all(ended[math.floor(y), math.floor(x)] for x, y in ends)
+
+
+@given(st.integers(0, 10**6))
+def test_rays_clear_up_to_the_first_wall_as_by_the_naive_twin(seed):
+    random = np.random.default_rng(seed)
+    occupied = random.uniform(size=(12, 15)) < 0.1
+    starts, ends = random.uniform(-1.0, 14.0, (2, 5, 2))
+    cleared = np.zeros(occupied.shape, np.bool_)
+    clear_rays(starts, ends, occupied, cleared)
+    naive = np.zeros(occupied.shape, bool)
+    for (x0, y0), (x1, y1) in zip(starts, ends, strict=True):
+        steps = math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0)) + 1
+        for s in range(steps):
+            row, column = math.floor(y0 + (y1 - y0) * s / steps), math.floor(x0 + (x1 - x0) * s / steps)
+            if not (0 <= row < 12 and 0 <= column < 15) or occupied[row, column]:
+                break
+            naive[row, column] = True
+    assert cleared.tolist() == naive.tolist()

@@ -134,7 +134,7 @@ def naive_revisit(rays, lidar, sonar, gap, everything, start):
         cells = [tuple(cell) for cell in path[:count].tolist()]
         if len(cells) < 2:
             continue
-        stops = [next((k for k in range(1, count) if grid[cells[k]]), None) for grid in (lidar, sonar)]
+        stops = [naive_stop(grid, cells) for grid in (lidar, sonar)]
         lengths = [math.dist(cells[0], cells[count - 1 if stop is None else stop]) for stop in stops]
         is_glass = lengths[0] - lengths[1] > gap
         stop = stops[1] if is_glass else stops[0]
@@ -142,8 +142,18 @@ def naive_revisit(rays, lidar, sonar, gap, everything, start):
             continue
         for cell in cells[:stop]:
             fused[cell] = 0.1
-        fused[cells[stop]] = 0.9
+        if (sonar if is_glass else lidar)[cells[stop]]:
+            fused[cells[stop]] = 0.9
     return fused
+
+
+def naive_stop(grid, cells):
+    """The first occupied cell, or the first step, but not from the sonar itself, between two that touch."""
+    for k in range(1, len(cells)):
+        (r0, c0), (r1, c1) = cells[k - 1], cells[k]
+        if grid[r1, c1] or (k > 1 and r0 != r1 and c0 != c1 and grid[r0, c1] and grid[r1, c0]):
+            return k
+    return None
 
 
 @given(st.integers(0, 10**6), st.booleans())
@@ -160,6 +170,15 @@ def test_rays_are_written_as_by_the_naive_twin(seed, everything):
     assert result == pytest.approx(expected, nan_ok=True)
     changed = ~((result == start) | (np.isnan(result) & np.isnan(start)))
     assert (source[changed] > 0).all()
+
+
+def test_a_wall_that_runs_aslant_holds_a_ray():
+    """Its cells touch at corners, through which Bresenham's line would slip."""
+    wall = np.fliplr(np.eye(4, dtype=bool))
+    path = np.array([[0, 0], [1, 1], [2, 2], [3, 3]])
+    assert first_stop(wall, path, 4) == 2
+    wall[1, 2] = False
+    assert first_stop(wall, path, 4) == 4
 
 
 def test_the_cell_under_the_sonar_stops_no_ray():

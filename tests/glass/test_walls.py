@@ -272,3 +272,17 @@ def test_beams_are_packed_by_node():
     assert packed.ends[packed.first[2] :].tolist() == [[3.0, 3.0]]
     empty = Beams.pack([], [])
     assert (empty.sensors.shape, empty.ends.shape, empty.first.tolist()) == ((0, 2), (0, 2), [0])
+
+
+def test_posts_that_the_lidar_takes_for_anything_but_glass_do_not_speak_against_what_sonars_hear():
+    """Narrow returns from the posts between panes; sonars hear the panes."""
+    sonar = 1
+    world = pane(0.0, 6.0, at=())
+    for k, x in enumerate(np.repeat(np.arange(0.2, 6.0, 1.0), 8)):
+        world.see(k % len(world.poses), (x, 1.5), UP, probability=0.2)
+    assert world.walls() == []
+    for node, x in enumerate((0.5, 1.5, 2.5, 3.5, 4.5, 5.5)):
+        world.see(node, (x, 1.5), UP, probability=0.9, extent=0.3, kind=sonar)
+    (wall,) = world.walls()
+    assert wall.by_sonar == 6
+    assert wall.length > 5.0

@@ -117,3 +117,10 @@ def test_a_stretch_withdrawn_is_not_bridged_from_both_sides():
     assert not covered(walls, 3.0)
     assert covered(walls, 1.0)
     assert covered(walls, 5.0)
+
+
+def test_what_sonars_hear_as_well_the_lidar_does_not_take_back():
+    world = door()
+    for node in range(6):
+        world.see(node, (0.05, 1.5), 0.5 * math.pi, extent=0.5, kind=1)
+    assert covered(world.walls(), 0.05)

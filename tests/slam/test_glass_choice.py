@@ -80,11 +80,29 @@ def test_too_few_flat_surfaces_are_told():
 
 def test_nothing_is_decided_before_there_are_enough_nodes():
     choice = DetectorChoice(GlassConfig())
-    for one in walls(FINE, count=59):
+    for one in walls(COARSE, count=59):
         choice.add(one, is_node=True)
     assert choice.is_pending
-    choice.add(walls(FINE, count=1)[0], is_node=True)
+    choice.add(walls(COARSE, count=1)[0], is_node=True)
     assert not choice.is_pending
+
+
+def test_a_lidar_that_calibrates_itself_learns_from_the_whole_run():
+    choice = DetectorChoice(GlassConfig())
+    for one in walls(FINE, count=250):
+        choice.add(one, is_node=True)
+    assert choice.is_pending
+    assert choice.wants_nodes_only
+    choice.settle()
+    assert choice.reason == "calibrated on 125 scans of this recording"
+
+
+@pytest.mark.parametrize("needs", [{"scheme": "local"}, {"ghosts_in_matching": False}])
+def test_who_needs_glass_on_the_way_cannot_wait_so_long(needs):
+    choice = DetectorChoice(GlassConfig(**needs))
+    for one in walls(FINE, count=60):
+        choice.add(one, is_node=True)
+    assert choice.name == "calibrated_peak"
 
 
 def test_a_lidar_that_stands_is_judged_by_other_scans_too():

@@ -11,7 +11,7 @@ from glassslam.geometry import compose, inverse, transform_points, wrap_angle
 from glassslam.glass.beams import BeamEvidence, Beams
 from glassslam.glass.observations import GlassObservations
 from glassslam.glass.walls import fit_walls
-from glassslam.sonar.glass import passed_share, sonar_glass_observations
+from glassslam.sonar.glass import passed_share, reading_noise, sonar_glass_observations
 
 CONFIG = SonarConfig()
 WALL_Y = 1.0
@@ -127,6 +127,26 @@ def test_beams_without_echo_pass_glass_too():
 def test_scattered_readings_are_no_surface():
     corridor = Corridor(noise=0.3)
     assert len(corridor.observed()) == 0
+
+
+def test_a_noisy_ring_finds_glass_in_longer_pieces():
+    corridor = Corridor(noise=0.04, length=6.0)
+    positions, normals = corridor.in_world(corridor.observed())
+    assert len(positions) >= 2
+    assert np.abs(positions[:, 1] - WALL_Y).max() < 0.05
+    assert (np.abs(normals - LEFT) < 4.0 * corridor.observed().normal_sigma).all()
+    assert corridor.observed().extent.max() > 0.25
+
+
+@pytest.mark.parametrize(("sigma", "expected"), [(0.0, 0.0), (0.01, 0.01), (0.04, 0.04), (0.3, 0.06)])
+def test_noise_is_measured_whatever_the_motion(sigma, expected):
+    """A sonar that nears a wall steadily, with a leap to another wall on the way."""
+    stamps = 0.3 * np.arange(400)
+    ranges = 2.5 - 0.004 * np.arange(400) - 0.5 * (np.arange(400) > 200)
+    ranges = ranges + np.random.default_rng(1).normal(0.0, sigma, 400)
+    rows = np.column_stack((stamps, np.zeros((400, 3)), ranges))
+    assert reading_noise([rows, rows[:0]], 1.0) == pytest.approx(expected, rel=0.15, abs=1e-6)
+    assert reading_noise([rows], 0.1) == 0.0
 
 
 def test_uncertainty_is_honest():

@@ -1,0 +1,72 @@
+"""One run at a time writes into a results directory."""
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from glassslam.errors import OutputError
+
+
+@contextmanager
+def locked(directory: str | Path) -> Iterator[None]:
+    """Keep other runs out of a directory while the block runs; the end of the process lets them in as well.
+
+    The lock is a hidden file beside the directory, or beside the first of its parents that does not exist
+    yet. On disks that know no locks there is none.
+
+    Parameters
+    ----------
+    directory : str or Path
+        Where results will be; need not exist.
+
+    Raises
+    ------
+    OutputError
+        Another run is writing there.
+    """
+    path = _lock_path(Path(directory).resolve())
+    descriptor = _acquire(path, directory)
+    try:
+        yield
+    finally:
+        if descriptor is not None:
+            with suppress(OSError):
+                path.unlink()
+            os.close(descriptor)
+
+
+def _lock_path(target: Path) -> Path:
+    home = next(folder for folder in target.parents if folder.is_dir())
+    return home / f".{'-'.join(target.relative_to(home).parts)}.lock"
+
+
+def _acquire(path: Path, directory: str | Path) -> int | None:
+    """Descriptor of the locked file; None where locks are not to be had."""
+    while True:
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except OSError:  # what cannot be written at all is told by those who write
+            return None
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_ours = _is_at(path, descriptor)
+        except BlockingIOError as error:
+            os.close(descriptor)
+            raise OutputError(
+                f"another run is writing to {directory}", "wait for it, or choose another directory"
+            ) from error
+        except OSError:
+            os.close(descriptor)
+            return None
+        if is_ours:
+            return descriptor
+        os.close(descriptor)  # the run before has removed the file in the meantime
+
+
+def _is_at(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
