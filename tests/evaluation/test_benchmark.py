@@ -49,7 +49,8 @@ def test_a_child_is_measured(benchmark_tool):
     assert exit_code == 3
     assert cpu > 0.0
     assert wall > 0.0
-    assert 90.0 < peak_mb < 500.0
+    # no upper bound: a child starts from the memory of the process that forks it, here the whole test suite
+    assert peak_mb > 90.0
 
 
 def test_carmen_logs_come_by_default_and_bags_on_demand(benchmark_tool):
