@@ -22,10 +22,13 @@ def checked_scan(
     ValueError
         The arrays are not flat, or differ in length.
     """
-    values = np.ascontiguousarray(ranges, dtype=np.float64)
-    echoes = (
-        np.zeros_like(values) if intensities is None else np.ascontiguousarray(intensities, dtype=np.float64)
-    )
+    with np.errstate(invalid="ignore"):  # damaged recordings hold signalling NaNs, of which casts complain
+        values = np.ascontiguousarray(ranges, dtype=np.float64)
+        echoes = (
+            np.zeros_like(values)
+            if intensities is None
+            else np.ascontiguousarray(intensities, dtype=np.float64)
+        )
     if values.ndim != 1:
         raise ValueError(f"ranges of one scan are needed, not an array of shape {values.shape}")
     if echoes.shape != values.shape:

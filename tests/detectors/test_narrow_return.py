@@ -176,3 +176,10 @@ def test_invalid_beams_beside_a_return_say_nothing():
     ranges[270], ranges[269] = 1.5, np.nan
     assert base_labels(ranges)[269] == INVALID
     assert len(detect(ranges)) == 0
+
+
+def test_signalling_nans_of_damaged_recordings_are_invalid_without_a_word():
+    ranges = np.full(360, 2.0, dtype=np.float32)
+    ranges.view(np.uint32)[10] = 0x7FA00000
+    found = narrow_return(ranges, ranges, -np.pi, np.radians(1.0))
+    assert found.labels[10] == 0
