@@ -69,7 +69,7 @@ def echo_scan(message: EchoScan, record_ns: int, mount: Mount) -> LaserScan:
 
 
 def _scan(message: Any, frame_id: str, stamp: float, record_ns: int, mount: Mount) -> LaserScan:
-    ranges: Float32Array = message.ranges
+    ranges = _quiet(message.ranges)
     angle_min, increment = float(message.angle_min), float(message.angle_increment)
     if ranges.size == 0:
         raise UnusableMessageError(NO_BEAMS)
@@ -78,7 +78,7 @@ def _scan(message: Any, frame_id: str, stamp: float, record_ns: int, mount: Moun
     if mount.mirrored:
         # Beams keep their order in time; only the sense of their angles changes.
         angle_min, increment = -angle_min, -increment
-    intensities: Float32Array = message.intensities
+    intensities = _quiet(message.intensities)
     return LaserScan(
         stamp=stamp,
         ranges=ranges,
@@ -91,6 +91,12 @@ def _scan(message: Any, frame_id: str, stamp: float, record_ns: int, mount: Moun
         frame_id=frame_id,
         record_stamp=record_ns / 1e9,
     )
+
+
+def _quiet(values: Float32Array) -> Float32Array:
+    """Readings with signalling NaNs made quiet: every later cast of a damaged one would warn."""
+    unread = np.isnan(values)
+    return np.where(unread, np.float32(np.nan), values) if unread.any() else values
 
 
 def upper_limit(announced: float, ceiling: float) -> float:
