@@ -77,7 +77,8 @@ def calibrated_peak(
     """
     values, echoes, labels = checked_scan(ranges, intensities, range_min, no_echo)
     least = math.log(min_probability / (1.0 - min_probability)) if 0.0 < min_probability < 1.0 else -math.inf
-    levels = echoes / calibration.diffuse.level(values)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # a calibration may be of any size
+        levels = echoes / calibration.diffuse.level(values)
     if angle_increment < 0.0:
         found = _detect(
             values[::-1],

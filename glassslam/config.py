@@ -12,6 +12,7 @@ from glassslam.yamltext import parse_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Weight = Annotated[float, Field(ge=0, le=1e6)]
 Probability = Annotated[float, Field(gt=0, lt=1)]
 Solver = Literal["lm", "casadi"]
 Count = Annotated[int, Field(ge=1)]
@@ -59,11 +60,11 @@ class FilterConfig(Section):
 class LocalConfig(Section):
     """Matching of a scan against the active submap."""
 
-    occupied_space_weight: Positive = 1.0
+    occupied_space_weight: Annotated[float, Field(gt=0, le=1e6)] = 1.0
     """Weight of the root mean square of 1 - P(occupied) at the returns."""
-    translation_weight: NonNegative = 0.5
+    translation_weight: Weight = 0.5
     """Weight of the odometry's translation, 1/m after 1 m of travel; falls with the root of the travel."""
-    rotation_weight: NonNegative = 0.33
+    rotation_weight: Weight = 0.33
     """Weight of the odometry's rotation, 1/rad after 1 rad of turning; falls with its root."""
     max_num_iterations: Count = 20
     """Most evaluations of one match."""
