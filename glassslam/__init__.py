@@ -21,7 +21,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from glassslam.api import Progress, map_recording
+    from glassslam.api import FinishedRun, Progress, map_recording, run_slam
     from glassslam.config import Config
     from glassslam.errors import GlassSlamError
     from glassslam.evaluation import (
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "BranchAndBoundMatcher": "glassslam.matching",
     "Config": "glassslam.config",
+    "FinishedRun": "glassslam.api",
     "GlassSlamError": "glassslam.errors",
     "Imu": "glassslam.records",
     "LaserScan": "glassslam.records",
@@ -80,12 +81,14 @@ _HOMES = {
     "read_relations": "glassslam.evaluation",
     "read_tum": "glassslam.outputs",
     "relative_pose_error": "glassslam.evaluation",
+    "run_slam": "glassslam.api",
     "write_results": "glassslam.outputs",
 }
 
 __all__ = [
     "BranchAndBoundMatcher",
     "Config",
+    "FinishedRun",
     "GlassSlamError",
     "Imu",
     "LaserScan",
@@ -113,6 +116,7 @@ __all__ = [
     "read_relations",
     "read_tum",
     "relative_pose_error",
+    "run_slam",
     "write_results",
 ]
 

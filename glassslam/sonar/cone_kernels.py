@@ -60,6 +60,16 @@ def box(reading: FloatArray, half_width: float, rows: int, columns: int) -> tupl
 
 
 @kernel
+def told(reading: FloatArray, cosine: float, sine: float, row: int, column: int, half_width: float) -> float:
+    """What a reading says of a cell, as `belief`; nothing behind the sonar."""
+    x, y = column + 0.5 - reading[0], row + 0.5 - reading[1]
+    along = cosine * x + sine * y
+    if along <= 0.0:
+        return 0.0
+    return belief(along, cosine * y - sine * x, half_width, reading[3], reading[4], reading[5])
+
+
+@kernel
 def enter_masses(
     readings: FloatArray,
     half_width: float,
@@ -75,13 +85,8 @@ def enter_masses(
         cosine, sine = math.cos(reading[2]), math.sin(reading[2])
         r0, r1, c0, c1 = box(reading, half_width, rows, columns)
         for row in range(r0, r1 + 1):
-            y = row + 0.5 - reading[1]
             for column in range(c0, c1 + 1):
-                x = column + 0.5 - reading[0]
-                along = cosine * x + sine * y
-                if along <= 0.0:
-                    continue
-                said = belief(along, cosine * y - sine * x, half_width, reading[3], reading[4], reading[5])
+                said = told(reading, cosine, sine, row, column, half_width)
                 if said > 0.0:
                     doubt_of_full[row, column] += math.log(1.0 - occupied * said)
                 elif said < 0.0:
@@ -104,13 +109,8 @@ def enter_odds(
         cosine, sine = math.cos(reading[2]), math.sin(reading[2])
         r0, r1, c0, c1 = box(reading, half_width, rows, columns)
         for row in range(r0, r1 + 1):
-            y = row + 0.5 - reading[1]
             for column in range(c0, c1 + 1):
-                x = column + 0.5 - reading[0]
-                along = cosine * x + sine * y
-                if along <= 0.0:
-                    continue
-                said = belief(along, cosine * y - sine * x, half_width, reading[3], reading[4], reading[5])
+                said = told(reading, cosine, sine, row, column, half_width)
                 if said == 0.0:
                     continue
                 lean = said * (occupied if said > 0.0 else empty)
@@ -134,13 +134,8 @@ def enter_means(
         cosine, sine = math.cos(reading[2]), math.sin(reading[2])
         r0, r1, c0, c1 = box(reading, half_width, rows, columns)
         for row in range(r0, r1 + 1):
-            y = row + 0.5 - reading[1]
             for column in range(c0, c1 + 1):
-                x = column + 0.5 - reading[0]
-                along = cosine * x + sine * y
-                if along <= 0.0:
-                    continue
-                said = belief(along, cosine * y - sine * x, half_width, reading[3], reading[4], reading[5])
+                said = told(reading, cosine, sine, row, column, half_width)
                 if said != 0.0:
                     new = values[k] if said > 0.0 else 0.0
                     cells[row, column] = mixed(cells[row, column], new, old_weight, new_weight)

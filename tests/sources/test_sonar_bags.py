@@ -1,16 +1,14 @@
 """Sonars in bags: single ranges, clouds, plain numbers, 3D points."""
 
-import itertools
 import math
 
 import numpy as np
 import pytest
-from tiny_bags import T0, odom, scan, tf, write_ros1, write_ros2
-from tiny_sonar import echoes, range_array, sonar
+from tiny_bags import T0, odom, scan, tf
+from tiny_sonar import echoes, only, range_array, ranges_of, sonar
 
 from glassslam.errors import UsageError
 from glassslam.records import LaserScan, Odometry, PointSet, RangeRing
-from glassslam.sources import SourceOptions, open_recording
 
 LEFT = tf(0.0, "base_link", "sonar_2", (0.1, 0.2, 0.3), (0.0, 0.0, math.pi / 2), topic="/tf_static")
 RIGHT = tf(0.0, "base_link", "sonar_10", (0.1, -0.2, 0.3), (0.0, 0.0, -math.pi / 2), topic="/tf_static")
@@ -18,41 +16,8 @@ RNG = np.random.default_rng(3)
 NAN = math.nan
 
 
-@pytest.fixture(params=["ros1", "ros2", "mcap"])
-def bag(request, tmp_path):
-    """Opens a bag of any version with these messages."""
-
-    def make(*messages, **options):
-        if request.param == "ros1":
-            path = write_ros1(tmp_path / "run.bag", messages)
-        else:
-            path = write_ros2(tmp_path / "run", messages, {"ros2": "sqlite3", "mcap": "mcap"}[request.param])
-        return open_recording(path, SourceOptions(**options))
-
-    return make
-
-
-@pytest.fixture
-def ros1(tmp_path):
-    numbers = itertools.count()
-
-    def make(*messages, **options):
-        path = tmp_path / f"run{next(numbers)}.bag"
-        return open_recording(write_ros1(path, messages), SourceOptions(**options))
-
-    return make
-
-
-def only(recording, kind):
-    return [record for record in recording.records() if isinstance(record, kind)]
-
-
-def ranges_of(recording):
-    return np.array([record.ranges for record in only(recording, RangeRing)])
-
-
-def test_ranges_in_frames_of_their_own(bag):
-    recording = bag(
+def test_ranges_in_frames_of_their_own(any_bag):
+    recording = any_bag(
         LEFT,
         RIGHT,
         odom(0.0),
@@ -94,11 +59,11 @@ def test_ranges_of_one_stamp_are_one_sweep(ros1):
     np.testing.assert_array_equal(ranges_of(recording), [[1.0, 2.0], [3.0, NAN], [3.5, 4.0]])
 
 
-def test_scans_and_odometry_come_as_without_sonar(bag):
+def test_scans_and_odometry_come_as_without_sonar(any_bag):
     rest = [message for k in range(20) for message in (odom(k / 10), scan(k / 10 + 0.03))]
     ranges = [sonar(k / 7, 1.0 + k / 10, frame="sonar_2") for k in range(14)]
     everything = sorted([*rest, *ranges], key=lambda sent: sent.at)
-    recording = bag(LEFT, *everything)
+    recording = any_bag(LEFT, *everything)
     scans = only(recording, LaserScan)
     assert [type(r) for r in recording.records() if not isinstance(r, RangeRing)] == [
         Odometry,
@@ -188,10 +153,10 @@ def test_a_sonar_that_turns_up_late_is_counted(ros1):
     assert recording.dropped == {"range of a sonar that is not in the ring": 1}
 
 
-def test_plain_numbers_need_a_ring(bag):
+def test_plain_numbers_need_a_ring(any_bag):
     rows = RNG.uniform(0.3, 2.9, (30, 9)).astype(np.float32)
     messages = [odom(0.0), scan(0.0), *(range_array(k / 10, row) for k, row in enumerate(rows))]
-    recording = bag(*messages, sonar_ring="turtlebot-9")
+    recording = any_bag(*messages, sonar_ring="turtlebot-9")
     np.testing.assert_array_equal(ranges_of(recording), rows)
     assert only(recording, RangeRing)[2].stamp == pytest.approx(T0 + 0.2)
 

@@ -1,54 +1,19 @@
 """Sonars that come as point clouds: rings of one point per sonar, and 3D sensors."""
 
-import itertools
 import math
 
 import numpy as np
 import pytest
-from tiny_bags import T0, odom, scan, tf, write_ros1, write_ros2
-from tiny_sonar import cloud, cloud2, echoes
+from tiny_bags import T0, odom, scan, tf
+from tiny_sonar import cloud, cloud2, echoes, only, ranges_of
 
 from glassslam.errors import UsageError
 from glassslam.records import PointSet, RangeRing
-from glassslam.sources import SourceOptions, open_recording
 from glassslam.sources.ringgeometry import ring_ranges
 from glassslam.sources.rings import load_ring
 
 RNG = np.random.default_rng(3)
 NAN = math.nan
-
-
-@pytest.fixture(params=["ros1", "ros2", "mcap"])
-def bag(request, tmp_path):
-    """Opens a bag of any version with these messages."""
-
-    def make(*messages, **options):
-        if request.param == "ros1":
-            path = write_ros1(tmp_path / "run.bag", messages)
-        else:
-            path = write_ros2(tmp_path / "run", messages, {"ros2": "sqlite3", "mcap": "mcap"}[request.param])
-        return open_recording(path, SourceOptions(**options))
-
-    return make
-
-
-@pytest.fixture
-def ros1(tmp_path):
-    numbers = itertools.count()
-
-    def make(*messages, **options):
-        path = tmp_path / f"run{next(numbers)}.bag"
-        return open_recording(write_ros1(path, messages), SourceOptions(**options))
-
-    return make
-
-
-def only(recording, kind):
-    return [record for record in recording.records() if isinstance(record, kind)]
-
-
-def ranges_of(recording):
-    return np.array([record.ranges for record in only(recording, RangeRing)])
 
 
 def sweeps(poses, count=30, far=5.0):
@@ -60,9 +25,9 @@ def sweeps(poses, count=30, far=5.0):
 
 
 @pytest.mark.parametrize("make", [cloud, cloud2])
-def test_the_cloud_of_a_pioneer(bag, make):
+def test_the_cloud_of_a_pioneer(any_bag, make):
     ranges, points = sweeps(load_ring("pioneer-3dx").poses)
-    recording = bag(
+    recording = any_bag(
         odom(0.0), scan(0.0), *(make(k / 10, p, topic="/RosAria/sonar") for k, p in enumerate(points))
     )
     assert recording.info.sonar_ring.name == "pioneer-3dx"
@@ -140,13 +105,13 @@ def test_two_rings_ask(ros1):
 
 
 @pytest.mark.parametrize(("number", "padding"), [("<f4", 0), ("<f8", 0), (">f4", 0), (">f8", 5)])
-def test_points_of_a_3d_sensor(bag, number, padding):
+def test_points_of_a_3d_sensor(any_bag, number, padding):
     mount = tf(0.0, "base_link", "toposens", (0.5, 0.1, 0.4), (0.0, 0.0, math.pi / 2), topic="/tf_static")
     points = [[[1.0, 2.0, 3.0], [NAN, 0.0, 0.0]], [], [[2.0, 0.0, 0.5]]]
     clouds = [
         cloud2(k / 10, p, frame="toposens", number=number, padding=padding) for k, p in enumerate(points)
     ]
-    recording = bag(mount, odom(0.0), scan(0.0), *clouds)
+    recording = any_bag(mount, odom(0.0), scan(0.0), *clouds)
     assert (recording.info.sonar_ring, recording.info.sonar_topics) == (None, ("/points",))
     found = only(recording, PointSet)
     assert [len(record.points) for record in found] == [1, 0, 1]

@@ -6,6 +6,7 @@ import numpy as np
 from rosbags.typesys import get_types_from_msg
 from tiny_bags import ROS1, T0, Sent, floats, header
 
+from glassslam.records import RangeRing
 from glassslam.sources.bag import CLOUD, CLOUD2, RANGE, RANGE_ARRAY, TS_SCAN
 
 _TS_SCAN = """Header header
@@ -123,3 +124,13 @@ def echoes(at: float, points: Any, *, topic: str = "/ts_scans", frame: str = "to
         )
 
     return Sent(topic, TS_SCAN, at, build)
+
+
+def only(recording, kind):
+    """The records of one kind."""
+    return [record for record in recording.records() if isinstance(record, kind)]
+
+
+def ranges_of(recording):
+    """Ranges of all sweeps, one row each."""
+    return np.array([record.ranges for record in only(recording, RangeRing)])
