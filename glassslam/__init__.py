@@ -21,7 +21,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from glassslam.api import FinishedRun, Progress, map_recording, run_slam
+    from glassslam.api import Progress, map_recording, run_slam
     from glassslam.config import Config
     from glassslam.errors import GlassSlamError
     from glassslam.evaluation import (
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         read_relations,
         relative_pose_error,
     )
+    from glassslam.finished import FinishedRun
     from glassslam.grid.probability_grid import ProbabilityGrid
     from glassslam.matching import BranchAndBoundMatcher, match_scan
     from glassslam.outputs import read_g2o, read_map, read_tum, write_results
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
         SonarRing,
         Trajectory,
     )
+    from glassslam.session import Session
     from glassslam.slam.mapper import Mapper
     from glassslam.slam.result import MapResult, OccupancyMap
     from glassslam.sources import SourceOptions, open_recording
@@ -53,7 +55,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "BranchAndBoundMatcher": "glassslam.matching",
     "Config": "glassslam.config",
-    "FinishedRun": "glassslam.api",
+    "FinishedRun": "glassslam.finished",
     "GlassSlamError": "glassslam.errors",
     "Imu": "glassslam.records",
     "LaserScan": "glassslam.records",
@@ -68,6 +70,7 @@ _HOMES = {
     "RangeRing": "glassslam.records",
     "RecordingInfo": "glassslam.records",
     "Relations": "glassslam.evaluation",
+    "Session": "glassslam.session",
     "SonarRing": "glassslam.records",
     "SourceOptions": "glassslam.sources",
     "Trajectory": "glassslam.records",
@@ -103,6 +106,7 @@ __all__ = [
     "RangeRing",
     "RecordingInfo",
     "Relations",
+    "Session",
     "SonarRing",
     "SourceOptions",
     "Trajectory",

@@ -2,20 +2,20 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from glassslam.config import Config, SonarConfig
-from glassslam.records import LaserScan, RangeRing, Record, RecordingInfo
+from glassslam.config import Config
+from glassslam.finished import FinishedRun, SourceFacts
+from glassslam.records import LaserScan, PointSet, RangeRing, Record, RecordingInfo
 from glassslam.sources import SourceOptions, open_recording
 
 if TYPE_CHECKING:
-    from glassslam.fusion.listener import SonarListener
-    from glassslam.slam.mapper import Mapper
-    from glassslam.slam.result import MapResult, OccupancyMap
+    from glassslam.session import Session
+    from glassslam.slam.result import MapResult
     from glassslam.sources import Recording
 
 _SECONDS_BETWEEN_REPORTS = 0.1
@@ -52,6 +52,7 @@ def map_recording(
     *,
     source_options: SourceOptions | None = None,
     progress: ProgressCallback | None = None,
+    session: "Session | None" = None,
 ) -> "MapResult":
     """Map a recording from its first to its last scan.
 
@@ -65,6 +66,8 @@ def map_recording(
         Topics, extrinsics and the part of the recording to use.
     progress : callable, optional
         Called with a `Progress` about ten times a second, in the calling thread.
+    session : Session, optional
+        Where the run is written down as it goes; a session that knows a part of it already is gone on with.
 
     Returns
     -------
@@ -88,72 +91,8 @@ def map_recording(
     array([12.31,  4.02,  1.57])
     >>> gs.write_results(result, "run-map")  # doctest: +SKIP
     """
-    run, reporter = _slam(recording, config, source_options, progress)
-    result = run.result()
-    reporter.tell("done")
-    return result
-
-
-class FinishedRun:
-    """SLAM of a recording, from which results can be drawn several times with other parameters of the sonars.
-
-    Parameters
-    ----------
-    mapper : Mapper
-        The mapper, finished.
-    sonar : SonarListener or None
-        Sweeps of the recording; None where it has none.
-    source : Recording
-        The source, read to its end.
-
-    Examples
-    --------
-    >>> import glassslam as gs
-    >>> run = gs.run_slam("run.bag")  # doctest: +SKIP
-    >>> sides = run.result(run.config.sonar.model_copy(update={"pose_kind": "Loc"}))  # doctest: +SKIP
-    """
-
-    def __init__(self, mapper: "Mapper", sonar: "SonarListener | None", source: "Recording") -> None:
-        self._mapper, self._sonar, self._source = mapper, sonar, source
-
-    @property
-    def config(self) -> Config:
-        """The configuration of the run."""
-        return self._mapper.config
-
-    def returns_map(self) -> "OccupancyMap":
-        """Map of the lidar in which beams without echo clear nothing."""
-        return self._mapper.returns_map()
-
-    def result(
-        self, sonar: SonarConfig | None = None, lidar_map: "OccupancyMap | None" = None
-    ) -> "MapResult":
-        """Map, trajectory and statistics of the run.
-
-        Parameters
-        ----------
-        sonar : SonarConfig, optional
-            Parameters of the sonars in place of those of the run; its `scan_filter` acts before SLAM and has
-            no effect here.
-        lidar_map : OccupancyMap, optional
-            What the rules that join two maps take for the map of the lidar.
-
-        Raises
-        ------
-        GridError
-            A sweep with another number of ranges than the ring has sonars.
-        """
-        listener = self._sonar
-        if listener is None:
-            result = self._mapper.drawn(self._source.info)
-        else:
-            listener = listener if sonar is None else listener.with_config(sonar)
-            result = self._mapper.drawn(self._source.info, [listener.glass])
-            result = listener.joined(result if lidar_map is None else replace(result, lidar_map=lidar_map))
-        result.statistics.messages_dropped.update(self._source.dropped)
-        result.statistics.damage.extend(self._source.damage)
-        result.statistics.warnings[:0] = self._source.warnings
-        return result
+    run = run_slam(recording, config, source_options=source_options, progress=progress, session=session)
+    return run.result()
 
 
 def run_slam(
@@ -162,12 +101,13 @@ def run_slam(
     *,
     source_options: SourceOptions | None = None,
     progress: ProgressCallback | None = None,
+    session: "Session | None" = None,
 ) -> FinishedRun:
     """Localise and map a recording, and leave the drawing of results to the caller.
 
     Parameters
     ----------
-    recording, config, source_options, progress
+    recording, config, source_options, progress, session
         As for `map_recording`.
 
     Raises
@@ -177,9 +117,9 @@ def run_slam(
     UsageError
         The options do not fit the recording.
     """
-    run, reporter = _slam(recording, config, source_options, progress)
-    reporter.tell("done")
-    return run
+    paths = [recording] if isinstance(recording, str | Path) else list(recording)
+    source = open_recording(paths, source_options or SourceOptions())
+    return RunInProgress(source, config, progress=progress, session=session).finished()
 
 
 class _Reporter:
@@ -189,6 +129,10 @@ class _Reporter:
         self._callback, self._info = callback, info
         self._first, self._last, self._due = 0.0, 0.0, 0.0
         self.scans = 0
+
+    @property
+    def recorded_seconds(self) -> float:
+        return self._last - self._first
 
     def count(self, scan: LaserScan) -> None:
         # Stamps may step back; recorded time does not.
@@ -202,40 +146,106 @@ class _Reporter:
 
     def tell(self, stage: Literal["mapping", "finishing", "done"]) -> None:
         if self._callback is not None:
-            self._callback(Progress(stage, self.scans, self._last - self._first, self._info))
+            self._callback(Progress(stage, self.scans, self.recorded_seconds, self._info))
 
 
-def _slam(
-    recording: str | Path | Sequence[str | Path],
-    config: Config | None,
-    source_options: SourceOptions | None,
-    progress: ProgressCallback | None,
-) -> tuple[FinishedRun, _Reporter]:
-    paths = [recording] if isinstance(recording, str | Path) else list(recording)
-    source = open_recording(paths, source_options or SourceOptions())
-    # The kernels are loaded only now: a recording that cannot be read is told at once.
-    from glassslam.slam.mapper import Mapper  # noqa: PLC0415
+@dataclass(slots=True)
+class _Others:
+    """Records beside those of the mapper, kept until poses are known."""
 
-    config = config or Config()
-    mapper = Mapper(config, source.info.base_from_laser)
-    sonar = _listener(source, config)
-    reporter = _Reporter(progress, source.info)
-    try:
-        _feed(mapper, sonar, _filtered(source, config), reporter)
-        reporter.tell("finishing")
-        mapper.settle()
-    finally:
-        mapper.close()
-    return FinishedRun(mapper, sonar, source), reporter
+    sweeps: list[RangeRing] = field(default_factory=list)
+    points: list[PointSet] = field(default_factory=list)
 
 
-def _listener(source: "Recording", config: Config) -> "SonarListener | None":
-    """What collects the sonar of a recording; None where it has none."""
-    if source.info.sonar_ring is None:
-        return None
-    from glassslam.fusion.listener import SonarListener  # noqa: PLC0415  (only for recordings with sonar)
+class RunInProgress:
+    """SLAM of a recording, which another thread or a signal may bring to an early end.
 
-    return SonarListener(source.info.sonar_ring, config.sonar)
+    Parameters
+    ----------
+    source : Recording
+        The recording, opened.
+    config, progress, session
+        As for `map_recording`.
+    names : sequence of str, optional
+        Names of the recordings for the report, where they are not their paths.
+    """
+
+    def __init__(
+        self,
+        source: "Recording",
+        config: Config | None = None,
+        *,
+        progress: ProgressCallback | None = None,
+        session: "Session | None" = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        # The kernels are loaded only now: a recording that cannot be read is told at once.
+        from glassslam.slam.mapper import Mapper  # noqa: PLC0415
+
+        self._source, self._config, self._session = source, config or Config(), session
+        info = source.info
+        self._info = info if names is None else replace(info, paths=tuple(names))
+        journal = None if session is None else session.journal
+        self._mapper = Mapper(self._config, info.base_from_laser, journal)
+        self._others = _Others()
+        self._reporter = _Reporter(progress, self._info)
+
+    @property
+    def scans(self) -> int:
+        """Scans read so far."""
+        return self._reporter.scans
+
+    @property
+    def recorded_seconds(self) -> float:
+        """Recorded time passed so far, s."""
+        return self._reporter.recorded_seconds
+
+    def hurry(self) -> None:
+        """End soon with what there is; from any thread, and from a handler of signals."""
+        self._mapper.hurry()
+
+    def finished(self) -> FinishedRun:
+        """Read the recording to its end, or until told to hurry, close the last loops and optimise.
+
+        Raises
+        ------
+        RecordingError
+            The recording cannot be read, or holds no usable scan (`NoScansError`).
+        OutputError
+            The session cannot be written.
+        """
+        try:
+            self._feed(_filtered(self._source, self._config))
+            if self._session is not None:
+                self._session.journal.flush()
+            self._reporter.tell("finishing")
+            settled = self._mapper.settle()
+        finally:
+            self._mapper.close()
+        run = FinishedRun(
+            settled, self._facts(), self._others.sweeps, self._others.points, not self._mapper.is_hurried
+        )
+        if self._session is not None and run.is_whole:
+            self._session.save(run)
+        self._reporter.tell("done")
+        return run
+
+    def _feed(self, records: Iterator[Record]) -> None:
+        for record in records:
+            if self._mapper.is_hurried:
+                return
+            if isinstance(record, RangeRing):
+                self._others.sweeps.append(record)
+            elif isinstance(record, PointSet):
+                self._others.points.append(record)
+            else:
+                self._mapper.add(record)
+            if isinstance(record, LaserScan):
+                self._reporter.count(record)
+
+    def _facts(self) -> SourceFacts:
+        source = self._source
+        return SourceFacts(self._info, dict(source.dropped), tuple(source.damage), tuple(source.warnings))
 
 
 def _filtered(source: "Recording", config: Config) -> Iterator[Record]:
@@ -247,16 +257,3 @@ def _filtered(source: "Recording", config: Config) -> Iterator[Record]:
 
     place = np.array(source.info.base_from_laser)
     return filtered_records(source.records(), place, ring, config.sonar.scan_filter)
-
-
-def _feed(
-    mapper: "Mapper", sonar: "SonarListener | None", records: Iterator[Record], reporter: _Reporter
-) -> None:
-    for record in records:
-        if isinstance(record, RangeRing):
-            if sonar is not None:
-                sonar.add(record)
-            continue
-        mapper.add(record)
-        if isinstance(record, LaserScan):
-            reporter.count(record)

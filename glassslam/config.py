@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from glassslam.errors import ConfigError
 from glassslam.yamltext import parse_yaml
@@ -13,7 +13,10 @@ from glassslam.yamltext import parse_yaml
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Weight = Annotated[float, Field(ge=0, le=1e6)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Probability = Annotated[float, Field(gt=0, lt=1)]
+FreeProbability = Annotated[float, Field(gt=0, le=0.5)]
+OccupiedProbability = Annotated[float, Field(ge=0.5, lt=1)]
 Solver = Literal["lm", "casadi"]
 Count = Annotated[int, Field(ge=1)]
 Small = Annotated[float, Field(ge=-0.2, le=0.2)]
@@ -338,8 +341,8 @@ class SonarConfig(Section):
     """Free space cleared by a sonar without echo, m; a smooth wall seen aslant does not echo either."""
     beam_width_deg: NonNegative = 18.0
     """Full width of the cone that echoes, deg, at most the field of view of the ring; 0: all of that."""
-    arc_thickness: Positive = 0.05
-    """Half thickness of the occupied arc at the sensor, m."""
+    arc_thickness: Positive = 0.025
+    """Half thickness of the occupied arc at the sensor, m; revisited rays end at its near side."""
     arc_growth: NonNegative = 0.01
     """Growth of that half thickness with the range, m/m."""
     occupied_belief: Probability = 0.6
@@ -360,6 +363,61 @@ class SonarConfig(Section):
     """Laser readings replaced by sonar before any SLAM."""
 
 
+class VolumeConfig(Section):
+    """3D maps from the lidar and the points of 3D ultrasonic sensors."""
+
+    resolution: Positive = 0.05
+    """Edge of a voxel, m."""
+    lidar_height: Finite | None = None
+    """Height of the plane of the lidar above the base, m; without one that of the recording, or else 0.2."""
+    band_low: Finite = 0.1
+    """Lowest height that goes into the 2D map and the pictures, m above the base."""
+    band_high: Finite = 1.8
+    """Highest of them, m above the base."""
+    projection: Literal["max", "pool"] = "max"
+    """What becomes of a column of voxels: its most occupied one decides, or all that are known."""
+    pool: Literal["bayes", "iop", "lop", "liop"] = "bayes"
+    """How the measurements of the two sensors at one time are joined."""
+    lidar_weight: NonNegative = 1.0
+    """Weight of the lidar in `lop` and `liop`."""
+    ultrasonic_weight: NonNegative = 1.0
+    """Weight of the ultrasonic sensor in `lop` and `liop`."""
+    max_pairing_time: NonNegative = 0.05
+    """Largest difference of the stamps of two measurements at one time, s."""
+    lidar_free: FreeProbability = 0.4
+    """P(occupied) of a voxel before the return of a beam."""
+    lidar_occupied: OccupiedProbability = 0.7
+    """P(occupied) of the voxel of that return."""
+    lidar_max_range: Positive = 20.0
+    """The lidar says nothing farther away, m."""
+    ultrasonic_free: FreeProbability = 0.4
+    """P(occupied) of a voxel before an echo."""
+    ultrasonic_occupied: OccupiedProbability = 0.7
+    """P(occupied) of the voxel of that echo."""
+    ultrasonic_max_range: Positive = 4.0
+    """The ultrasonic sensor says nothing farther away, m."""
+    ultrasonic_half_angle_deg: Annotated[float, Field(gt=0, le=180)] = 90.0
+    """Echoes farther from the axis of the sensor are not believed, deg."""
+    min_probability: Annotated[float, Field(gt=0, lt=0.5)] = 0.1192
+    """Least P(occupied) of a voxel."""
+    max_probability: Annotated[float, Field(gt=0.5, lt=1)] = 0.971
+    """Largest P(occupied) of a voxel."""
+    occupied_threshold: Probability = 0.5
+    """P(occupied) from which a voxel counts as occupied; below it is free."""
+
+    @model_validator(mode="after")
+    def _orders(self) -> Self:
+        """Refuse bounds in the wrong order, and weights that are all zero."""
+        if not self.band_low < self.band_high:
+            low, high = self.band_low, self.band_high
+            raise ValueError(f"no height lies between band_low {low:g} and band_high {high:g} m")
+        if not self.min_probability < self.occupied_threshold < self.max_probability:
+            raise ValueError("occupied_threshold does not lie between min_probability and max_probability")
+        if self.lidar_weight == self.ultrasonic_weight == 0.0:
+            raise ValueError("lidar_weight and ultrasonic_weight are both 0")
+        return self
+
+
 class Config(Section):
     """Everything that decides a map, apart from the recording itself."""
 
@@ -373,6 +431,7 @@ class Config(Section):
     map: MapConfig = MapConfig()
     glass: GlassConfig = GlassConfig()
     sonar: SonarConfig = SonarConfig()
+    volume: VolumeConfig = VolumeConfig()
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

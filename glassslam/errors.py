@@ -46,6 +46,26 @@ class OutputError(GlassSlamError):
     """A result that cannot be written or read back."""
 
 
+class SessionError(GlassSlamError):
+    """A session file that cannot be used."""
+
+
+class InterruptedRunError(GlassSlamError):
+    """A run that was asked to end before it was through; it can be taken up again.
+
+    Parameters
+    ----------
+    message, hint : str
+        As for every error.
+    exit_code : int
+        130 or 143, as the shell tells of SIGINT and SIGTERM.
+    """
+
+    def __init__(self, message: str, hint: str, exit_code: int = 130) -> None:
+        super().__init__(message, hint)
+        self.exit_code = exit_code
+
+
 class EvaluationError(GlassSlamError):
     """A truth file that does not fit the result."""
 

@@ -145,12 +145,15 @@ class PointSet:
         Where the sensor sits in the base frame, m.
     record_stamp : float
         Time at which the message was recorded, s.
+    axis : tuple of float
+        Where the sensor looks in the base frame, of length 1.
     """
 
     stamp: float
     points: Float32Array
     origin: FloatArray
     record_stamp: float = 0.0
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
 
 
 Record: TypeAlias = LaserScan | Odometry | Imu | RangeRing | PointSet
@@ -223,6 +226,10 @@ class RecordingInfo:
         Where the sonars sit; None without a ring.
     sonar_topics : tuple of str
         Topics of the ring and of 3D ultrasonic sensors in use.
+    points_topics : tuple of str
+        Those of 3D ultrasonic sensors among them.
+    laser_height : float or None
+        Height of the laser above the base, m; None when the recording does not tell it.
     """
 
     paths: tuple[str, ...]
@@ -236,6 +243,8 @@ class RecordingInfo:
     no_echo: float | None = None
     sonar_ring: SonarRing | None = None
     sonar_topics: tuple[str, ...] = ()
+    points_topics: tuple[str, ...] = ()
+    laser_height: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import settings
 from glassslam.config import Config
 from glassslam.posegraph.graph import Constraint
 from glassslam.records import RecordingInfo, Trajectory
+from glassslam.session.identity import Recorded
 from glassslam.slam.result import MapResult, OccupancyMap, RunStatistics, StageTime
 from glassslam.slam.trajectory import PoseTracks
 
@@ -27,6 +29,31 @@ def data_dir() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real recordings at {folder}; set GLASSSLAM_DATA")
     return folder
+
+
+@pytest.fixture
+def asked_runs(monkeypatch, tiny_result):
+    """Runs asked for on the command line: recordings, options, config; each gives the tiny result."""
+    asked = []
+
+    class Run:
+        def __init__(self, source, config, **_):
+            source.config = config
+
+        def hurry(self):
+            raise AssertionError
+
+        def finished(self):
+            return SimpleNamespace(is_whole=True, config=tiny_result.config, result=lambda: tiny_result)
+
+    def opened(recordings, options):
+        asked.append(SimpleNamespace(recordings=recordings, options=options, config=None))
+        return asked[-1]
+
+    monkeypatch.setattr("glassslam.sources.open_recording", opened)
+    monkeypatch.setattr("glassslam.api.RunInProgress", Run)
+    monkeypatch.setattr("glassslam.session.session.identify", lambda path: Recorded(str(path), str(path), ""))
+    return asked
 
 
 def occupancy_map(drawing: str, resolution: float = 0.5, origin: tuple[float, float] = (0.0, 0.0)):

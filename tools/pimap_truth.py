@@ -2,6 +2,7 @@
 
 python tools/pimap_truth.py -o truth                     truth/pimap_scene4.yaml, .pgm and .labels.png
 python tools/pimap_truth.py -o truth --as-measured       bent as the published poses are
+python tools/pimap_truth.py -o truth --onto MAP          bowed as the walls of a map are
 python tools/pimap_truth.py --measure $GLASSSLAM_DATA/pimap    fit every line to the recording anew
 glassslam evaluate MAP --truth truth/pimap_scene4.yaml   compare
 """
@@ -14,15 +15,18 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from pimap_bow import Bow, bow_of, bowed
 from pydantic import BaseModel, ConfigDict, Field
 from rich.console import Console
 from rich.table import Table
 
 from glassslam.errors import GlassSlamError, OutputError, RecordingError
+from glassslam.evaluation import align_maps, read_map
 from glassslam.outputs import write_map
 from glassslam.outputs.labels import FREE, GLASS, SOLID, UNKNOWN, write_label_image
 from glassslam.records import FloatArray
 from glassslam.simulation import TrueMap, draw_true_map
+from glassslam.slam.result import OccupancyMap
 from glassslam.yamlmodel import load_yaml_model
 
 PLAN = Path(__file__).resolve().parents[1] / "datasets" / "pimap" / "scene4_plan.yaml"
@@ -73,23 +77,25 @@ class Plan(BaseModel):
         return ends
 
 
-def draw(plan: Plan, *, straight: bool = True) -> TrueMap:
+def draw(plan: Plan, *, straight: bool = True, bow: Bow | None = None) -> TrueMap:
     """Raster the plan; the edges of the mapped area bound free space and are unknown themselves."""
     lines = plan.lines(straight=straight)
-    glass = np.array([line.kind == "glass" for line in plan.segments])
-    edge = np.array([line.kind == "edge" for line in plan.segments])
+    kinds = np.array([line.kind for line in plan.segments])
+    if bow is not None:
+        lines, of_line = bowed(lines, bow)
+        kinds = kinds[of_line]
     seeds = np.array(plan.seeds)
-    drawn = draw_true_map(lines, glass, seeds, plan.resolution)
+    drawn = draw_true_map(lines, kinds == "glass", seeds, plan.resolution)
     # the cells of everything but the edges, found as those of glass are
-    real = draw_true_map(lines, ~edge, seeds, plan.resolution).glass
+    real = draw_true_map(lines, kinds != "edge", seeds, plan.resolution).glass
     probability = drawn.grid.probability.copy()
     probability[(probability == 1.0) & ~real] = np.nan
     return TrueMap(replace(drawn.grid, probability=probability), drawn.glass)
 
 
-def write(plan: Plan, folder: Path, *, straight: bool) -> None:
+def write(plan: Plan, folder: Path, *, straight: bool, bow: Bow | None = None) -> None:
     """Write the map_server files and the classes, and say how large the scene is."""
-    drawn = draw(plan, straight=straight)
+    drawn = draw(plan, straight=straight, bow=bow)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         paths = write_map(drawn.grid, folder / f"{plan.name}.yaml")
@@ -105,6 +111,11 @@ def write(plan: Plan, folder: Path, *, straight: bool) -> None:
     )
     for path in paths:
         print(f"wrote {path}")
+
+
+def onto(plan: Plan, lidar_map: OccupancyMap) -> Bow:
+    """The bow of a map against the plan."""
+    return bow_of(plan, lidar_map, align_maps(lidar_map, draw(plan).grid))
 
 
 def returns(folder: Path) -> FloatArray:
@@ -173,18 +184,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="where the map is written")
     parser.add_argument("--as-measured", action="store_true", help="keep the bend of the published poses")
+    parser.add_argument("--onto", type=Path, metavar="MAP", help="bow the plan as the walls of this map are")
     parser.add_argument(
         "--measure", type=Path, metavar="DATA", help="folder of scene4.bag and scene4_pose.txt"
     )
     words = parser.parse_args(arguments)
     if words.output is None and words.measure is None:
         parser.error("give -o DIR or --measure DATA")
+    if words.as_measured and words.onto is not None:
+        parser.error("--as-measured and --onto exclude each other")
     try:
         plan = load_yaml_model(PLAN, Plan)
         if words.measure is not None:
             Console().print(measure(plan, words.measure))
         if words.output is not None:
-            write(plan, words.output, straight=not words.as_measured)
+            bow = None if words.onto is None else onto(plan, read_map(words.onto))
+            write(plan, words.output, straight=not words.as_measured, bow=bow)
     except GlassSlamError as error:
         print(f"error: {error.message}" + (f" ({error.hint})" if error.hint else ""), file=sys.stderr)
         return error.exit_code

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from glassslam.cli.interruption import Terminated
 from glassslam.cli.terminal import complain, discard_output, emit
 from glassslam.errors import GlassSlamError, UsageError
 
@@ -44,10 +45,6 @@ Exit codes: 0 done, 1 failed, 2 wrong usage or configuration,
 """
 
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
-
-
-class Terminated(BaseException):
-    """The process was asked to end (SIGTERM)."""
 
 
 class LazyGroup(TyperGroup):

@@ -114,6 +114,7 @@ def calibrate_command(
     from glassslam.cli.settings import default_directory  # noqa: PLC0415
     from glassslam.errors import UsageError  # noqa: PLC0415
     from glassslam.outputs import check_directory  # noqa: PLC0415
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.sources import SourceOptions  # noqa: PLC0415
 
     sessions = make_sessions(
@@ -124,9 +125,12 @@ def calibrate_command(
     directory = output or default_directory(recordings, "calibration")
     check_directory(directory, overwrite=overwrite, files=FILES)
     options = SourceOptions(scan_topic=scan_topic, start=start, duration=duration)
-    with progress_bar(quiet=quiet) as progress:
-        result = run(sessions, name=name, options=options, align=align, geometry=geometry, progress=progress)
-    written = write_calibration(result, directory, overwrite=overwrite)
+    with locked(directory):
+        with progress_bar(quiet=quiet) as progress:
+            result = run(
+                sessions, name=name, options=options, align=align, geometry=geometry, progress=progress
+            )
+        written = write_calibration(result, directory, overwrite=overwrite)
     if json:
         _print_json(result, directory)
     elif not quiet:

@@ -28,16 +28,18 @@ def demo(output: Output = Path("demo_out")) -> int:
     from glassslam.cli.map import map_command  # noqa: PLC0415
     from glassslam.cli.simulate import describe, record  # noqa: PLC0415
     from glassslam.cli.terminal import emit  # noqa: PLC0415
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.simulation import Scene, find_scene, simulate  # noqa: PLC0415  (loads numba)
 
     bag, results = output / "demo.bag", output / "map"
-    _check_own(output, bag)
-    simulation = simulate(Scene.load(find_scene(_SCENE)), _LIDAR, sonar=_SONARS)
-    written = record(simulation, bag)
-    emit(describe(simulation, written) + "\n")
-    code = map_command([bag], output=results, overwrite=True)
-    emit(_verdict(results / "trajectory.tum", written.true_trajectory))
-    emit(_glass_verdict(results / "glass.geojson", written.true_glass))
+    with locked(output):
+        _check_own(output, bag)
+        simulation = simulate(Scene.load(find_scene(_SCENE)), _LIDAR, sonar=_SONARS)
+        written = record(simulation, bag)
+        emit(describe(simulation, written) + "\n")
+        code = map_command([bag], output=results, overwrite=True)
+        emit(_verdict(results / "trajectory.tum", written.true_trajectory))
+        emit(_glass_verdict(results / "glass.geojson", written.true_glass))
     emit(f"\nlook at {results / 'map.png'}\nnext: glassslam map YOUR.bag -o DIR\n")
     return code
 
@@ -48,9 +50,10 @@ def _check_own(output: Path, bag: Path) -> None:
 
     if output.exists() and not output.is_dir():
         raise OutputError(f"{output} is a file", "name a directory for the demo")
-    known = {bag, *truth_paths(bag), bag.parent / "map"}
-    foreign = sorted(set(output.iterdir()) - known) if output.exists() else []
-    if foreign:
+    known = {bag, *truth_paths(bag), bag.parent / "map", bag.parent / "map.partial"}
+    present = sorted(set(output.iterdir()) - known) if output.exists() else []
+    # A run that was killed may have left its lock, which begins with a dot.
+    if foreign := [path for path in present if not path.name.startswith(".")]:
         raise OutputError(f"{output} holds other files: {foreign[0].name}", "choose a new directory")
 
 

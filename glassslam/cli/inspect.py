@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from glassslam.cli.map import Sonar, SonarRing, SonarTopic, Strict
+from glassslam.cli.map import PointsTopic, Sonar, SonarRing, SonarTopic, Strict
 
 if TYPE_CHECKING:
     from glassslam.sources.report import (
@@ -43,6 +43,7 @@ def inspect(
     recordings: Recordings,
     sonar: Sonar = None,
     sonar_topic: SonarTopic = None,
+    points_topic: PointsTopic = None,
     sonar_ring: SonarRing = None,
     strict: Strict = False,
     json: Json = False,
@@ -53,7 +54,10 @@ def inspect(
     from glassslam.sources.inspection import inspect_recording  # noqa: PLC0415
 
     wishes = tuple(sonar_topic) if sonar_topic else None
-    options = SourceOptions(sonar=sonar, sonar_topic=wishes, sonar_ring=sonar_ring, strict=strict)
+    points = tuple(points_topic) if points_topic else None
+    options = SourceOptions(
+        sonar=sonar, sonar_topic=wishes, sonar_ring=sonar_ring, points_topic=points, strict=strict
+    )
     report = inspect_recording(recordings, options)
     if json:
         from json import dumps  # noqa: PLC0415
@@ -200,7 +204,10 @@ def _plan_rows(report: "RecordingReport") -> Rows:
         return
     x, y, yaw = plan.base_from_laser
     yield "map would use", f"scans {plan.scan_topic}, odometry {plan.odom_topic or 'none'}"
-    if plan.sonar_topics:
-        yield "", f"sonar {_listed(plan.sonar_topics)}" + (plan.sonar_ring and f", ring {plan.sonar_ring}")
+    if sweeps := tuple(topic for topic in plan.sonar_topics if topic not in plan.points_topics):
+        yield "", f"sonar {_listed(sweeps)}" + (plan.sonar_ring and f", ring {plan.sonar_ring}")
+    if plan.points_topics:
+        height = "not known" if plan.laser_height is None else f"{plan.laser_height:.3f} m above the base"
+        yield "", f"3D points {_listed(plan.points_topics)}, height of the laser {height}"
     imu = f"imu {plan.imu_topic or 'none'}"
     yield "", f"{imu}, laser at x {x:.3f} y {y:.3f} m, yaw {math.degrees(yaw):.2f} deg on the robot"

@@ -5,6 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
+from glassslam.cli.run import Manner, begin
+from glassslam.cli.run import resume as go_on
+from glassslam.errors import UsageError
+
 EXAMPLES = """\
   glassslam map run.bag                             results in run-map/
   glassslam map run.bag -o office --overwrite       replace earlier results
@@ -16,11 +20,12 @@ EXAMPLES = """\
   glassslam map run.mcap --scan-topic /front/scan   choose among several lidars
   glassslam map run.bag --laser-pose 0.1,0,0        the laser sits 0.1 m ahead of the centre
   glassslam map run.clf.gz --config sick.yaml --set sensor.max_range=20
+  glassslam map --resume office                     go on with a run that was interrupted
   glassslam map run.bag --start 10 --duration 60 --every 2
 """
 
 Recordings = Annotated[
-    list[Path],
+    list[Path] | None,
     typer.Argument(
         metavar="RECORDING...",
         help="ROS 1 or 2 bag (file or directory), mcap, CARMEN or Player log; several follow each other.",
@@ -73,6 +78,10 @@ SonarTopic = Annotated[
     list[str] | None,
     typer.Option(metavar="TOPIC", help="Topic of the sonars, or none; may be repeated."),
 ]
+PointsTopic = Annotated[
+    list[str] | None,
+    typer.Option(metavar="TOPIC", help="Topic of 3D ultrasonic points, or none; may be repeated."),
+]
 SonarRing = Annotated[
     str | None,
     typer.Option(
@@ -92,12 +101,19 @@ Echo = Annotated[
     str, typer.Option(metavar="WHICH", help="Echo of multi-echo scans: first, last or strongest.")
 ]
 Strict = Annotated[bool, typer.Option("--strict", help="Refuse a damaged bag, rather than read the rest.")]
+Resume = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Go on with the interrupted run into DIR, as it was begun. RECORDING only if it has moved.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the report as JSON instead of the summary.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 def map_command(
-    recordings: Recordings,
+    recordings: Recordings = None,
     output: Output = None,
     config: ConfigFile = None,
     assignments: Assignments = None,
@@ -110,6 +126,7 @@ def map_command(
     imu_topic: ImuTopic = None,
     sonar: Sonar = None,
     sonar_topic: SonarTopic = None,
+    points_topic: PointsTopic = None,
     sonar_ring: SonarRing = None,
     laser_pose: LaserPose = None,
     start: Start = 0.0,
@@ -117,17 +134,28 @@ def map_command(
     every: Every = 1,
     echo: Echo = "first",
     strict: Strict = False,
+    resume: Resume = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
     """Make a map from a recording and write it, the trajectory, the pose graph and a report to DIR.
 
-    Topics are picked where there is only one choice. DIR appears when everything is done:
-    a failed or interrupted run leaves nothing behind and earlier results as they were.
+    Topics are picked where there is only one choice. DIR appears when everything is done; until then
+    earlier results stay as they were, and the run is in DIR.partial, from where --resume goes on with it.
+    The first Ctrl-C ends a run with a map of what there is, the second one at once.
     """
     from glassslam.outputs import Stopwatch, check_directory  # noqa: PLC0415  (loads numpy)
 
-    stopwatch = Stopwatch()
+    manner = Manner(Stopwatch(), json=json, quiet=quiet)
+    if resume is not None:
+        refuse_others(
+            output, config, assignments, sensor, calibration, require_intensity, overwrite, scan_topic,
+            odom_topic, imu_topic, sonar, sonar_topic, points_topic, sonar_ring, laser_pose, start, duration,
+            strict,
+        )  # fmt: skip
+        return go_on(resume, recordings, manner)
+    if not recordings:
+        raise UsageError("no recording is named", "glassslam map RECORDING, or --resume DIR")
     from glassslam.cli.settings import (  # noqa: PLC0415
         calibration_assignments,
         check_intensity_use,
@@ -167,53 +195,22 @@ def map_command(
         sonar=sonar,
         sonar_topic=tuple(sonar_topic) if sonar_topic else None,
         sonar_ring=sonar_ring,
+        points_topic=tuple(points_topic) if points_topic else None,
         strict=strict,
     )
-    from glassslam.outputs.lock import locked  # noqa: PLC0415
-
-    with locked(directory):
-        return _run(recordings, directory, resolved, options, stopwatch, overwrite, json, quiet)
+    return begin(recordings, directory, resolved, options, overwrite=overwrite, manner=manner)
 
 
-def _run(
-    recordings: list[Path],
-    directory: Path,
-    config: Any,
-    options: Any,
-    stopwatch: Any,
-    overwrite: bool,
-    json: bool,
-    quiet: bool,
-) -> int:
-    from glassslam.api import map_recording  # noqa: PLC0415  (loads numba and casadi)
-    from glassslam.cli.progress import progress_bar  # noqa: PLC0415
-    from glassslam.cli.settings import calibration_warnings  # noqa: PLC0415
-    from glassslam.outputs import build_report, write_results  # noqa: PLC0415
+def refuse_others(*given: object) -> None:
+    """Make sure that a run that goes on is not asked for anything else.
 
-    with progress_bar(quiet=quiet) as progress:
-        result = map_recording(recordings, config, source_options=options, progress=progress)
-    result.statistics.warnings[:0] = calibration_warnings(config)
-    written = write_results(result, directory, overwrite=overwrite, stopwatch=stopwatch)
-    report = build_report(result, stopwatch.read())
-    if json:
-        _print_json(report, directory)
-    elif not quiet:
-        from glassslam.cli.summary import show_summary  # noqa: PLC0415  (loads rich)
-
-        show_summary(report, written)
-    return 3 if is_damaged(report) else 0
-
-
-def _print_json(report: dict[str, Any], directory: Path) -> None:
-    import json  # noqa: PLC0415  (only for --json)
-
-    from glassslam.cli.terminal import emit  # noqa: PLC0415
-
-    emit(json.dumps({"directory": str(directory), **report}, indent=2, allow_nan=False) + "\n")
-
-
-def is_damaged(report: dict[str, Any]) -> bool:
-    """Whether anything could not be read, or was dropped that the user did not ask to leave out."""
-    return bool(report["damage"] or report["solver_failures"]) or any(
-        (*report["scans"]["dropped"].values(), *report["messages_dropped"].values())
-    )
+    Raises
+    ------
+    UsageError
+        One of the options is given.
+    """
+    if any(value not in (None, False, 0.0) for value in given):
+        raise UsageError(
+            "--resume goes on with a run as it was begun: no other options",
+            "draw its results in another way afterwards: glassslam render",
+        )

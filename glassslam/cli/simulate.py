@@ -66,13 +66,15 @@ def simulate(
     (BAG.truth.map.yaml), which evaluate --truth reads.
     """
     from glassslam.cli.terminal import emit  # noqa: PLC0415
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.simulation import Scene, find_scene  # noqa: PLC0415  (loads numba)
     from glassslam.simulation import simulate as prepare  # noqa: PLC0415
 
-    if output.exists() and not overwrite:
-        raise UsageError(f"{output} exists already", "use --overwrite to replace it")
-    simulation = prepare(Scene.load(find_scene(scene)), sensor, seed, rate, sonar)
-    written = record(simulation, output, quiet=json)
+    with locked(output):
+        if output.exists() and not overwrite:
+            raise UsageError(f"{output} exists already", "use --overwrite to replace it")
+        simulation = prepare(Scene.load(find_scene(scene)), sensor, seed, rate, sonar)
+        written = record(simulation, output, quiet=json)
     if json:
         from json import dumps  # noqa: PLC0415
 

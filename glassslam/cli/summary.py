@@ -43,6 +43,7 @@ def summary_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
         ("loop closures", f"{closures['accepted']} of {closures['tried']} tried{_rejected(closures)}"),
     ]
     rows.append(("glass", _glass(report["glass"])))
+    rows += _volume(report["volume"])
     rows += [("residual", f"{name} {value:.4g}") for name, value in _numbers(report["residuals"])]
     rows += [
         ("time", f"{name} {stage['wall']:.2f} s ({stage['cpu']:.2f} s CPU)")
@@ -62,6 +63,18 @@ def _glass(glass: dict[str, Any]) -> str:
     walls = f"{glass['walls']} wall{'s' * (glass['walls'] != 1)} of {glass['wall_length_m']:.1f} m"
     seen_by = "sonar" if glass["detector"] == "off" else glass["detector"]
     return f"{walls}, {glass['observations']} observations by {seen_by}{why}"
+
+
+def _volume(volume: dict[str, Any] | None) -> list[tuple[str, str]]:
+    if volume is None:
+        return []
+    low, high = volume["band_m"]
+    voxels = f"{volume['occupied_voxels']} occupied and {volume['free_voxels']} free voxels"
+    return [
+        ("volume", f"{volume['points']} points of {volume['point_sets']} pings, {voxels}"),
+        ("", f"map of {low:g} to {high:g} m, lidar {volume['lidar_height_m']:g} m above the base"),
+        *(("", f"left out: {count} x {reason}") for reason, count in volume["dropped"].items()),
+    ]
 
 
 def _numbers(values: dict[str, float | None]) -> list[tuple[str, float]]:

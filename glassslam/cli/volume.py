@@ -1,15 +1,18 @@
 """`glassslam volume`: a 3D map from a recording with ultrasonic points and a known trajectory."""
 
-from collections.abc import Iterable
+import time
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from glassslam.cli.map import Assignments, ConfigFile, LaserPose
 from glassslam.errors import UsageError
 
 if TYPE_CHECKING:
-    from glassslam.records import Record, Trajectory
+    from glassslam.api import ProgressCallback
+    from glassslam.records import Record, RecordingInfo, Trajectory
     from glassslam.sources import SourceOptions
     from glassslam.sources.recording import Recording as OpenRecording
     from glassslam.sources.sonarfile import SonarFile
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
 EXAMPLES = """\
   glassslam volume run.bag --trajectory run-map/trajectory.tum
   glassslam volume run.bag --trajectory run-map/trajectory.tum -o run-3d --band 0.1 1.8
+  glassslam volume run.bag --trajectory truth.tum --config run-map/config.yaml --set volume.pool=lop
   glassslam volume still.bag                     a robot that stands
 """
 
@@ -33,24 +37,40 @@ Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="DIR", help="Results directory [default: NAME-volume]."),
 ]
-Resolution = Annotated[float, typer.Option(min=0.001, metavar="M", help="Edge of a voxel, m.")]
-BandOption = Annotated[
-    tuple[float, float],
-    typer.Option("--band", metavar="LOW HIGH", help="Heights that become the 2D map, m above the base."),
+Resolution = Annotated[
+    float | None, typer.Option(min=0.001, metavar="M", help="Edge of a voxel, m [default: 0.05].")
 ]
-LidarHeight = Annotated[float, typer.Option(metavar="M", help="Height of the lidar above the base, m.")]
+BandOption = Annotated[
+    tuple[float, float] | None,
+    typer.Option(
+        "--band",
+        metavar="LOW HIGH",
+        help="Heights that become the 2D map, m above the base [default: 0.1 1.8].",
+    ),
+]
+LidarHeight = Annotated[
+    float | None,
+    typer.Option(metavar="M", help="Height of the lidar above the base, m [default: as recorded, or 0.2]."),
+]
 PoolOption = Annotated[
-    Literal["bayes", "iop", "lop", "liop"],
-    typer.Option("--pool", help="How the measurements of the two sensors are joined."),
+    Literal["bayes", "iop", "lop", "liop"] | None,
+    typer.Option("--pool", help="How the measurements of the two sensors are joined [default: bayes]."),
 ]
 RuleOption = Annotated[
-    Literal["max", "pool"],
-    typer.Option("--projection", help="What becomes of a column of voxels in the map."),
+    Literal["max", "pool"] | None,
+    typer.Option("--projection", help="What becomes of a column of voxels in the map [default: max]."),
 ]
-SonarTopic = Annotated[
-    str | None, typer.Option("--sonar-topic", metavar="TOPIC", help="Topic of the ultrasonic points.")
+PointsTopic = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--points-topic",
+        "--sonar-topic",
+        metavar="TOPIC",
+        help="Topic of the ultrasonic points; may be repeated.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results.")]
 
 
@@ -58,56 +78,108 @@ def volume(
     recording: Recording,
     trajectory: TrajectoryFile = None,
     output: Output = None,
-    resolution: Resolution = 0.05,
-    band: BandOption = (0.1, 1.8),
-    lidar_height: LidarHeight = 0.2,
-    pool: PoolOption = "bayes",
-    projection: RuleOption = "max",
-    sonar_topic: SonarTopic = None,
+    config: ConfigFile = None,
+    assignments: Assignments = None,
+    resolution: Resolution = None,
+    band: BandOption = None,
+    lidar_height: LidarHeight = None,
+    pool: PoolOption = None,
+    projection: RuleOption = None,
+    points_topic: PointsTopic = None,
+    laser_pose: LaserPose = None,
     overwrite: Overwrite = False,
     json: Json = False,
+    quiet: Quiet = False,
 ) -> int:
     """Build a 3D map from a 2D lidar and a 3D ultrasonic sensor along a trajectory that is known.
 
     DIR then holds volume.npz, volume.bt (OctoMap), volume.ply, volume.png, slices.png, and the heights of
-    the band projected on a 2D map, volume_map.yaml and volume_map.pgm.
+    the band projected on a 2D map, volume_map.yaml and volume_map.pgm. Parameters are those of the section
+    volume of the configuration, of which some have an option of their own.
     """
-    from glassslam.outputs import read_tum, write_map  # noqa: PLC0415  (loads numpy)
+    from glassslam.cli.settings import parse_pose, resolve_config  # noqa: PLC0415
+    from glassslam.outputs import read_tum  # noqa: PLC0415  (loads numpy)
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.sources import SourceOptions  # noqa: PLC0415
-    from glassslam.volume.files import check_folder, write_volume  # noqa: PLC0415
-    from glassslam.volume.mapper import VolumeOptions, build_volume  # noqa: PLC0415  (loads kernels)
-    from glassslam.volume.projection import project  # noqa: PLC0415
+    from glassslam.volume.files import check_folder  # noqa: PLC0415  (loads kernels)
 
-    if not band[0] < band[1]:
-        raise UsageError(
-            f"--band {band[0]:g} {band[1]:g}: no height lies between", "give the lower one first"
-        )
+    options = {"resolution": resolution, "lidar_height": lidar_height, "pool": pool, "projection": projection}
+    wishes = [*_band_assignments(band), *(f"volume.{k}={v}" for k, v in options.items() if v is not None)]
+    resolved = resolve_config(config, [*(assignments or ()), *wishes])
     target = output or _default_directory(recording)
     check_folder(target, overwrite=overwrite)
     poses = _standing() if trajectory is None else read_tum(trajectory)
-    options = VolumeOptions(resolution=resolution, lidar_height=lidar_height, pool=pool)
-    source, records, laser_pose, dropped = _records(recording, SourceOptions(sonar_topic=sonar_topic))
-    built = build_volume(records, poses, options, laser_pose)
+    source_options = SourceOptions(
+        # rings of sonars are of no use here, and may be in the way
+        sonar_topic="none" if points_topic else None,
+        points_topic=tuple(points_topic) if points_topic else None,
+        laser_pose=parse_pose(laser_pose),
+    )
+    with locked(target):
+        summary = _made(recording, source_options, poses, resolved, target, overwrite=overwrite, quiet=quiet)
+    if json or not quiet:
+        _show(summary, json)
+    return 3 if summary["dropped"] or summary["damage"] else 0
+
+
+def _made(
+    recording: Path,
+    source_options: "SourceOptions",
+    poses: "Trajectory",
+    config: Any,
+    target: Path,
+    *,
+    overwrite: bool,
+    quiet: bool,
+) -> dict[str, Any]:
+    """Read, map and write; what is to be told of it."""
+    from glassslam.cli.progress import progress_bar  # noqa: PLC0415
+    from glassslam.outputs import write_map  # noqa: PLC0415
+    from glassslam.volume.files import write_volume  # noqa: PLC0415
+    from glassslam.volume.mapper import build_volume  # noqa: PLC0415  (loads kernels)
+    from glassslam.volume.options import volume_options  # noqa: PLC0415
+    from glassslam.volume.projection import project  # noqa: PLC0415
+
+    source, records, info, dropped = _records(recording, source_options)
+    options = volume_options(config.volume, config.sensor, info.laser_height)
+    with progress_bar(quiet=quiet) as progress:
+        built = build_volume(_followed(records, info, progress), poses, options, info.base_from_laser)
     _check_seen(built, recording)
-    seen_from_above = project(built.fused, band, projection)
+    heights = config.volume.band_low, config.volume.band_high
+    seen_from_above = project(built.fused, heights, config.volume.projection)
     written = write_volume(
         built.fused,
         target,
-        band=band,
+        band=heights,
         also=lambda folder: write_map(seen_from_above, folder / "volume_map.yaml"),
         overwrite=overwrite,
     )
     summary = _summary(built, {**dropped, **built.dropped}, written)
-    summary["damage"] = [damage.text for damage in source.damage]
-    _show(summary, json)
-    return 3 if summary["dropped"] or summary["damage"] else 0
+    return {**summary, "lidar_height": options.lidar_height, "damage": [part.text for part in source.damage]}
+
+
+def _band_assignments(band: tuple[float, float] | None) -> list[str]:
+    """Assignments of the heights of an option.
+
+    Raises
+    ------
+    UsageError
+        There is no height between them.
+    """
+    if band is None:
+        return []
+    low, high = band
+    if not low < high:
+        raise UsageError(f"--band {low:g} {high:g}: no height lies between", "give the lower one first")
+    return [f"volume.band_low={low!r}", f"volume.band_high={high!r}"]
 
 
 def _records(
     path: Path, options: "SourceOptions"
-) -> tuple["OpenRecording | SonarFile", "Iterable[Record]", tuple[float, float, float], dict[str, int]]:
-    """The source, its records, pose of the laser, and what is dropped while they are read."""
+) -> tuple["OpenRecording | SonarFile", "Iterable[Record]", "RecordingInfo", dict[str, int]]:
+    """The source, its records, what is known of it, and what is dropped while it is read."""
     from glassslam.errors import NoScansError  # noqa: PLC0415
+    from glassslam.records import RecordingInfo  # noqa: PLC0415
     from glassslam.sources import open_recording  # noqa: PLC0415
     from glassslam.sources.sonarfile import open_sonar  # noqa: PLC0415
 
@@ -120,8 +192,26 @@ def _records(
             dropped[reason] = dropped.get(reason, 0) + 1
 
         file = open_sonar(path, options)
-        return file, file.records(drop), (0.0, 0.0, 0.0), dropped
-    return source, source.records(), source.info.base_from_laser, source.dropped
+        begin, end = file.span
+        return file, file.records(drop), RecordingInfo((str(path),), "points", end - begin, 0), dropped
+    return source, source.records(), source.info, source.dropped
+
+
+def _followed(
+    records: "Iterable[Record]", info: "RecordingInfo", progress: "ProgressCallback | None"
+) -> "Iterator[Record]":
+    """The records; how far they have come is told about ten times a second."""
+    from glassslam.api import Progress  # noqa: PLC0415
+    from glassslam.records import LaserScan  # noqa: PLC0415
+
+    scans, first, due = 0, None, 0.0
+    for record in records:
+        scans += isinstance(record, LaserScan)
+        first = record.record_stamp if first is None else first
+        if progress is not None and time.monotonic() >= due:
+            progress(Progress("mapping", scans, max(0.0, record.record_stamp - first), info))
+            due = time.monotonic() + 0.1
+        yield record
 
 
 def _standing() -> "Trajectory":
@@ -152,13 +242,15 @@ def _check_seen(built: "Volume", recording: Path) -> None:
 
 def _summary(built: "Volume", dropped: dict[str, int], written: list[Path]) -> dict[str, Any]:
     memory, (low, high) = built.fused.memory(), built.fused.bounds()
+    occupied, free = built.fused.volumes()
     return {
         **built.counts,
         "dropped": {reason: count for reason, count in dropped.items() if count},
         "resolution": built.fused.resolution,
         "nodes": memory.nodes,
         "leaves": memory.leaves,
-        "occupied_voxels": len(built.fused.occupied().voxels()),
+        "occupied_voxels": occupied,
+        "free_voxels": free,
         "bytes": memory.used_bytes,
         "bounds": [[round(float(value), 6) for value in corner] for corner in (low, high)],
         "written": [str(path) for path in written],
@@ -179,6 +271,7 @@ def _show(summary: dict[str, Any], as_json: bool) -> None:
         f"{summary['scans']} scans, {summary['points']} points of {summary['point_sets']} pings, "
         f"{summary['pairs']} pairs",
         f"{size} m, {summary['occupied_voxels']} occupied voxels of {summary['resolution']:g} m, "
+        f"lidar {summary['lidar_height']:g} m above the base, "
         f"{summary['leaves']} leaves, {summary['bytes'] / 1e6:.1f} MB",
         *(f"dropped: {count} x {reason}" for reason, count in summary["dropped"].items()),
         *(f"damage: {text}" for text in summary["damage"]),

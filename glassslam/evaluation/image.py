@@ -22,7 +22,12 @@ from glassslam.outputs.map_server import FREE, OCCUPIED, OCCUPIED_THRESH, UNKNOW
 from glassslam.records import FloatArray
 from glassslam.slam.result import OccupancyMap
 
-_GREY = np.array([UNKNOWN, FREE, OCCUPIED, OCCUPIED], dtype=np.uint8)
+PIMAP_UNKNOWN = 128
+"""Grey of unknown cells in the images of pi-map.
+
+Where a map is nearly its truth, half of MSE / (1 - NCC) is the variance of the truth; the last column of
+Table I gives 3111 and 4940. True maps have 1200 to 1900 with 205 for unknown, and 3700 to 4800 with 128.
+"""
 _SSIM_WINDOW = 7
 
 
@@ -33,7 +38,7 @@ class ImageErrors:
     Attributes
     ----------
     mse : float
-        Mean square difference of the grey values 0 (occupied), 205 (unknown) and 254 (free).
+        Mean square difference of the grey values 0 (occupied), 254 (free) and that of unknown cells.
     ssim : float
         Structural similarity (Wang et al. 2004), windows of 7 x 7 cells; 1 for equal maps.
     ncc : float
@@ -71,6 +76,7 @@ def evaluate_image(
     true_glass: Mask | None = None,
     map_from_truth: tuple[float, float, float] | None = None,
     seed: int = 0,
+    unknown_grey: int = UNKNOWN,
 ) -> ImageErrors:
     """Compare a map with the true map after laying the truth onto it (pi-map, section IV-B).
 
@@ -89,11 +95,14 @@ def evaluate_image(
         Motion x, y, theta, m and rad, where it is known; searched with `align_maps` when omitted.
     seed : int
         Seed of the search.
+    unknown_grey : int
+        Grey value of unknown cells in the images compared, 0 to 255; 205 as map_server writes it. The figures
+        of pi-map fit 128 (see `PIMAP_UNKNOWN`).
 
     Raises
     ------
     EvaluationError
-        A map has no occupied cell, the region is smaller than a window of SSIM, or glass does not fit.
+        A map has no occupied cell, the region is smaller than a window of SSIM, or glass or grey do not fit.
 
     Examples
     --------
@@ -113,8 +122,11 @@ def evaluate_image(
     true = drawn_anew(true_classes, truth, motion, grid, low, shape)
     if min(shape) < _SSIM_WINDOW:
         raise EvaluationError(f"the truth covers {shape[1]} x {shape[0]} cells", "SSIM needs 7 x 7 cells")
+    if not 0 <= unknown_grey <= 255:
+        raise EvaluationError(f"no grey value is {unknown_grey}", "unknown_grey lies between 0 and 255")
+    greys = np.array([unknown_grey, FREE, OCCUPIED, OCCUPIED], dtype=np.uint8)
     return ImageErrors(
-        **_image_metrics(_GREY[mine], _GREY[true]),
+        **_image_metrics(greys[mine], greys[true]),
         iou_occupied=_iou(mine >= SOLID, true >= SOLID),
         iou_free=_iou(mine == OPEN, true == OPEN),
         iou_unknown=_iou(mine == NO_CLASS, true == NO_CLASS),

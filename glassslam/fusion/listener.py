@@ -1,5 +1,6 @@
 """What sonars add to a run: pieces of glass before the walls are fitted, maps afterwards."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,7 @@ _LIDAR, _SONAR, _BOTH = 1, 2, 3
 
 
 class SonarListener:
-    """Collects the sweeps of a run.
+    """Takes the sweeps of a run.
 
     Parameters
     ----------
@@ -33,34 +34,24 @@ class SonarListener:
         Where the sonars sit in the base frame.
     config : SonarConfig
         Glass from sonar, sonar map and fusion.
+    sweeps : sequence of RangeRing
+        Readings, in the order of the recording.
 
     Examples
     --------
     >>> import numpy as np
     >>> import glassslam as gs
     >>> ring = gs.SonarRing(np.zeros((1, 3)), 0.3, 0.2, 5.0)
-    >>> listener = SonarListener(ring, gs.Config().sonar)
-    >>> listener.add(gs.RangeRing(0.0, np.array([1.0], dtype=np.float32)))
-    >>> len(listener)
+    >>> sweeps = [gs.RangeRing(0.0, np.array([1.0], dtype=np.float32))]
+    >>> len(SonarListener(ring, gs.Config().sonar, sweeps))
     1
     """
 
-    def __init__(self, ring: SonarRing, config: SonarConfig) -> None:
-        self._ring, self._config = ring, config
-        self._records: list[RangeRing] = []
+    def __init__(self, ring: SonarRing, config: SonarConfig, sweeps: Sequence[RangeRing]) -> None:
+        self._ring, self._config, self._records = ring, config, sweeps
 
     def __len__(self) -> int:
         return len(self._records)
-
-    def add(self, sweep: RangeRing) -> None:
-        """Take one sweep, in the order of the recording."""
-        self._records.append(sweep)
-
-    def with_config(self, config: SonarConfig) -> "SonarListener":
-        """A listener with the same sweeps and other parameters."""
-        other = SonarListener(self._ring, config)
-        other._records = self._records
-        return other
 
     def glass(self, tracks: PoseTracks, beams: BeamEvidence) -> GlassObservations:
         """Pieces of glass that the sonars hear and the lidar looks through, bound to the nodes.

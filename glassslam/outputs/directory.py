@@ -4,7 +4,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -33,7 +33,20 @@ SONAR_FILES = (
     "source_map.png",
 )
 """What a run with sonar writes as well."""
-ALL_FILES = RESULT_FILES + GLASS_FILES + SONAR_FILES
+VOLUME_FILES = (
+    "volume.npz",
+    "volume.bt",
+    "volume.ply",
+    "volume.png",
+    "slices.png",
+    "volume_map.yaml",
+    "volume_map.pgm",
+    "volume_map.png",
+)
+"""What a run with points of a 3D ultrasonic sensor writes as well."""
+STATE_FILES = ("session.db",)
+"""What a run of the command line writes as well: all it takes to draw its results again."""
+ALL_FILES = RESULT_FILES + GLASS_FILES + SONAR_FILES + VOLUME_FILES + STATE_FILES
 """Everything that may stand in a results directory."""
 
 _HINTS = {
@@ -102,9 +115,13 @@ def _check_parent(directory: str | Path, target: Path) -> None:
 
 @contextmanager
 def staged_directory(
-    directory: str | Path, *, overwrite: bool = False, files: Sequence[str] = ALL_FILES
+    directory: str | Path,
+    *,
+    overwrite: bool = False,
+    files: Sequence[str] = ALL_FILES,
+    working: Path | None = None,
 ) -> Iterator[Path]:
-    """Lend a temporary folder which takes the place of `directory` when the block ends without error.
+    """Lend a folder which takes the place of `directory` when the block ends without error.
 
     Parameters
     ----------
@@ -114,6 +131,9 @@ def staged_directory(
         Whether earlier results there may be replaced; they stay untouched until the new ones are whole.
     files : sequence of str
         Names of the files that are results.
+    working : Path, optional
+        The folder to lend, beside `directory`; what stood in it before the block stays when the block fails.
+        A new one, of which nothing stays, when left out.
 
     Yields
     ------
@@ -126,32 +146,63 @@ def staged_directory(
         As by `check_directory`; any OSError inside the block becomes an OutputError.
     """
     target = check_directory(directory, overwrite=overwrite, files=files)
-    staged: Path | None = None
+    staged, kept = working, set[Path]() if working is None else set(working.iterdir())
     made = [folder for folder in target.parents if not folder.exists()]
+    is_published = False
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        staged = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
+        if staged is None:
+            staged = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
         yield staged
         staged.chmod(0o777 & ~_umask())
         for path in (*staged.iterdir(), staged):
             _flush(path)
-        _publish(staged, target)
+        _publish(staged, target, staged.with_suffix(".old") if working is None else _retired(target))
+        is_published = True
     except OSError as error:
         raise _unwritable(directory, error) from error
     finally:
-        if staged is not None:
-            shutil.rmtree(staged, ignore_errors=True)
+        if staged is not None and not is_published:
+            _clear(staged, kept)
         for folder in made:
             with suppress(OSError):  # it holds the results, or what others have written meanwhile
                 folder.rmdir()
 
 
-def _publish(staged: Path, target: Path) -> None:
+def working_directory(directory: str | Path) -> Path:
+    """Where a run that is not finished keeps its session: DIR.partial, beside DIR."""
+    target = Path(directory).resolve()
+    return target.with_name(f"{target.name}.partial")
+
+
+def restore_results(directory: str | Path) -> None:
+    """Put earlier results back that a run was about to replace in the moment it was killed."""
+    target = Path(directory).resolve()
+    if not target.exists() and _retired(target).is_dir():
+        _retired(target).rename(target)
+
+
+def _retired(target: Path) -> Path:
+    """Where earlier results are while new ones take their place."""
+    return target.with_name(f".{target.name}.replaced")
+
+
+def _clear(folder: Path, kept: Set[Path]) -> None:
+    """Remove what a failed block has written; all of the folder where nothing stood in it before."""
+    if not kept:
+        shutil.rmtree(folder, ignore_errors=True)
+        return
+    for path in set(folder.iterdir()) - kept:
+        path.unlink(missing_ok=True)
+
+
+def _publish(staged: Path, target: Path, retired: Path) -> None:
     if not target.exists():
         staged.rename(target)
         _flush_names(target.parent)
+        shutil.rmtree(retired, ignore_errors=True)
         return
-    retired = staged.with_suffix(".old")
+    shutil.rmtree(retired, ignore_errors=True)
     try:
         target.rename(retired)
         staged.rename(target)

@@ -19,6 +19,9 @@ PICTURES: Final = {
     "labels.png": "What the cells are: black solid, blue glass, orange ghosts, white free, grey unknown.",
     "fused_map.png": "Lidar and sonar together.",
     "source_map.png": "Who decided the fused map: blue lidar, orange sonar, green both, grey neither.",
+    "volume_map.png": "What lidar and 3D ultrasonic sensor have found in a band of heights, seen from above.",
+    "volume.png": "The highest that is occupied in that band, in the colour of its height; white free.",
+    "slices.png": "Horizontal slices of the volume: black occupied, white free, grey unknown.",
 }
 """Pictures shown where they were written, and what is said of them."""
 

@@ -51,7 +51,7 @@ def recording_rows(report: Report) -> Rows:
     for name in ("scan", "odom", "imu"):
         yield f"{name} topic", source[f"{name}_topic"] or "none"
     for topic in source["sonar_topics"]:
-        yield "sonar topic", topic
+        yield "points topic" if topic in source["points_topics"] else "sonar topic", topic
     if ring := source["sonar_ring"]:
         yield "sonar ring", f"{ring['name'] or 'from the recording'}: {len(ring['poses'])} sonars"
     x, y, yaw = source["base_from_laser"]
@@ -115,6 +115,22 @@ def sonar_rows(sonar: SonarMaps | None, config: "SonarConfig") -> Rows:
     yield "sweeps", f"{sonar.sweeps}"
     yield "sonar map", f"{config.algorithm}, poses {config.pose_kind}"
     yield "joined by", config.fusion.method
+
+
+def volume_rows(volume: Report | None) -> Rows:
+    """What the 3D ultrasonic sensors have added."""
+    if volume is None:
+        return
+    (low, high), edge = volume["band_m"], volume["resolution"]
+    yield "points", f"{volume['points']} of {volume['point_sets']} pings"
+    yield "scans", f"{volume['scans']}, {volume['pairs']} of them paired with a ping"
+    yield from _counted("left out", volume["dropped"])
+    size = " x ".join(_number(b - a, 1) for a, b in zip(*volume["bounds_m"], strict=True))
+    yield "size", f"{size} m, {edge:g} m per voxel"
+    yield "voxels", f"{volume['occupied_voxels']} occupied, {volume['free_voxels']} free"
+    yield "plane of the lidar", f"{volume['lidar_height_m']:g} m above the base"
+    yield "heights in the map", f"{low:g} to {high:g} m above the base, by {volume['projection']}"
+    yield "joined by", volume["pool"]
 
 
 def cost_rows(report: Report) -> Rows:

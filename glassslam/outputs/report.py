@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from glassslam.outputs.volume_maps import describe_volume
 from glassslam.records import Trajectory
 from glassslam.slam.result import MapResult, RunStatistics
 
@@ -113,6 +114,7 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "origin": list(result.map.origin),
         },
         "glass": _glass(result),
+        "volume": describe_volume(result),
         "warnings": list(statistics.warnings),
         "versions": versions(),
         "stages": {name: asdict(stage) for name, stage in statistics.stages.items()},

@@ -129,10 +129,11 @@ def ultrasonic_records(ear: Ear, motion: Motion, seed: int, start: float) -> Ite
     random = np.random.default_rng([seed, _OWN_STREAM])
     delay = 2.0 * ear.model.range_max / _SPEED_OF_SOUND
     times = np.arange(0.0, float(motion.times[-1]), 1.0 / ear.mount.rate)
+    axis = math.cos(ear.mount.pose[2]), math.sin(ear.mount.pose[2]), 0.0
     for time, pose in zip(times, motion.at(times), strict=True):
         points = _turned(ear.ping(pose, random), ear.mount.pose[2]) + ear.origin
         stamp = round(start + float(time), 6)
-        yield PointSet(stamp, points.astype(np.float32), ear.origin, record_stamp=stamp + delay)
+        yield PointSet(stamp, points.astype(np.float32), ear.origin, stamp + delay, axis)
 
 
 def _directions(model: UltrasonicModel, random: np.random.Generator) -> FloatArray:

@@ -21,6 +21,8 @@ _PROFILE_REACH, _PROFILE_STEP, _PROFILE_MARGIN = 8.0, 0.2, 0.06
 _AMBIGUOUS_REACH = 0.5
 _AMBIGUOUS_SIGMA = 20.0
 _LEAST_POINTS = 50
+_CLEARLY_BETTER = 0.03
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,36 @@ class Closure:
     searched: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class SearchOutcome:
+    """What the report needs of a search.
+
+    Attributes
+    ----------
+    node, anchor : int
+        The node, and the node of the submap nearest to it.
+    rejected : str
+        As in `Closure`.
+    ambiguous : bool
+        As in `Closure`.
+    distance : float
+        How far from the anchor the node was expected, m.
+    """
+
+    node: int
+    anchor: int
+    rejected: str
+    ambiguous: bool
+    distance: float
+
+    @classmethod
+    def of(cls, closure: Closure) -> "SearchOutcome":
+        """Of a closure found or rejected."""
+        candidate = closure.candidate
+        distance = math.hypot(*candidate.anchor_from_node[:2].tolist())
+        return cls(candidate.node, candidate.anchor, closure.rejected, closure.ambiguous, distance)
+
+
 def close(
     candidate: Candidate,
     scene: Neighbourhood,
@@ -111,22 +143,9 @@ def close(
 
     if len(scene.fine) < _LEAST_POINTS:
         return refuse("few points")
-    guess = compose(candidate.anchor_in_local, candidate.anchor_from_node)
-    if matcher is not None:
-        found = matcher.match(
-            scene.coarse, guess, candidate.linear_window, candidate.angular_window, config.min_score
-        )
-        if found is None:
-            return refuse("low score")
-        guess = found.pose
-    match = match_scan(
-        grid,
-        scene.fine,
-        guess,
-        translation_weight=_WEAK_WEIGHT,
-        rotation_weight=_WEAK_WEIGHT,
-        max_iterations=30,
-    )
+    match = _located(candidate, scene, grid, matcher, config)
+    if match is None:
+        return refuse("low score")
     if match.residual > min(max(0.45, 1.1 * scene.residual + 0.03), config.max_residual):
         return refuse("poor fit")
     measured = between(candidate.anchor_in_local, match.pose)
@@ -137,9 +156,56 @@ def close(
     return Closure(candidate, "", measured, covariance, ambiguous, searched)
 
 
+def is_wide(candidate: Candidate, config: LoopClosureConfig) -> bool:
+    """Whether a search looks farther around than any within one stretch of the run."""
+    return candidate.angular_window > math.radians(config.max_angular_window_deg) + _ROUNDING
+
+
 def needs_search(linear_window: float, angular_window: float) -> bool:
     """Whether a window is wider than the basin of the gradient match."""
     return linear_window > _DIRECT_LINEAR or angular_window > _DIRECT_ANGULAR
+
+
+def _located(
+    candidate: Candidate,
+    scene: Neighbourhood,
+    grid: ProbabilityGrid,
+    matcher: BranchAndBoundMatcher | None,
+    config: LoopClosureConfig,
+) -> MatchResult | None:
+    """Where the scene fits best in the window; None when nowhere.
+
+    A search all around finds as good a place in every corridor that looks alike: the expected place counts
+    as well, and is left only for a clearly better one.
+    """
+    guess = compose(candidate.anchor_in_local, candidate.anchor_from_node)
+    if matcher is None:
+        return _refined(scene, grid, guess)
+    center = guess
+    if is_wide(candidate, config) and candidate.linear_window >= config.max_linear_window:
+        # no window reaches all the places the graph allows: look where the submap was seen from
+        center = np.array([*candidate.anchor_in_local[:2], guess[2]])
+    found = matcher.match(
+        scene.coarse, center, candidate.linear_window, candidate.angular_window, config.min_score
+    )
+    searched = None if found is None else _refined(scene, grid, found.pose)
+    if not is_wide(candidate, config):
+        return searched
+    near = _refined(scene, grid, guess)
+    if searched is None:
+        return near
+    return searched if searched.residual < near.residual - _CLEARLY_BETTER else near
+
+
+def _refined(scene: Neighbourhood, grid: ProbabilityGrid, guess: FloatArray) -> MatchResult:
+    return match_scan(
+        grid,
+        scene.fine,
+        guess,
+        translation_weight=_WEAK_WEIGHT,
+        rotation_weight=_WEAK_WEIGHT,
+        max_iterations=30,
+    )
 
 
 def _uncertainty(

@@ -8,9 +8,12 @@ import numpy as np
 from glassslam.geometry import between, compose
 from glassslam.records import FloatArray, Imu, Odometry
 from glassslam.slam.odometry_track import OdometryTrack, YawTrack
+from glassslam.slam.tracking import Event
 
 _LONGEST_STEP = 0.6
 _SHORTEST_STEP = 0.01
+_LONG_SILENCE, _MANY_STEPS, _CLOCK_STEP = 5.0, 10.0, 1.0
+_ZERO_DISTANCE, _ZERO_TURN = 0.3, 0.1
 _LARGEST_JUMP, _FASTEST, _FARTHEST = 3.0, 15.0, 100.0
 
 
@@ -33,6 +36,8 @@ class Prediction:
         Whether odometry stands behind the prediction.
     after_gap : bool
         Whether the recording is silent for so long before the scan that the robot may be anywhere near.
+    event : Event
+        What the recording did since the last pose.
     """
 
     pose_in_local: FloatArray
@@ -42,6 +47,7 @@ class Prediction:
     alternative: FloatArray | None
     measured: bool
     after_gap: bool
+    event: Event = Event.NONE
 
 
 class PoseExtrapolator:
@@ -63,6 +69,7 @@ class PoseExtrapolator:
         self.odometry = OdometryTrack()
         self.yaw = YawTrack()
         self._stamp = math.nan
+        self._period = 0.0
         self._pose = np.zeros(3)
         self._middle_stamp = math.nan
         self._middle = np.zeros(3)
@@ -106,8 +113,13 @@ class PoseExtrapolator:
         if twist is not None and half_sweep != 0.0:
             middle = compose(pose_in_local, twist * half_sweep)
         step = stamp + half_sweep - self._middle_stamp
-        self._velocity = between(self._middle, middle) / step if _is_usual(step) else None
+        if _is_usual(step):
+            self._velocity = between(self._middle, middle) / step
+        elif not self._is_clock_set(stamp):
+            self._velocity = None
         self._middle_stamp, self._middle = stamp + half_sweep, middle
+        if not self._is_clock_set(stamp):
+            self._period = max(0.0, stamp - self._stamp)
         self._stamp, self._pose = stamp, pose_in_local
         if middle is not pose_in_local and odometry_pose is None and self._velocity is not None:
             self._pose = compose(middle, -half_sweep * self._velocity)
@@ -116,9 +128,14 @@ class PoseExtrapolator:
 
     def predict(self, stamp: float, odometry_pose: FloatArray | None) -> Prediction:
         """Expected pose of the next scan, from its stamp and the pose of the odometry at it, if known."""
-        step = stamp - self._stamp
+        # a clock that is set back most likely does not stop the robot
+        step = self._period if self._is_clock_set(stamp) else stamp - self._stamp
         coasting = self._coast(step)
-        moved = self._odometry_motion(odometry_pose, step)
+        jumps = self.jumps
+        event = self._break_before(stamp)
+        moved = None
+        if event is Event.NONE or not _has_begun_anew(self._odometry_pose, odometry_pose):
+            moved = self._odometry_motion(odometry_pose, step)
         motion = moved if moved is not None else self._turn_by_imu(stamp, coasting)
         alternative = None
         if moved is not None and coasting is not None:
@@ -133,8 +150,22 @@ class PoseExtrapolator:
             twist,
             alternative,
             moved is not None,
-            not 0.0 < step < _LONGEST_STEP,
+            not 0.0 < stamp - self._stamp < _LONGEST_STEP,
+            event | (Event.ODOMETRY_JUMP if self.jumps > jumps else Event.NONE),
         )
+
+    def _break_before(self, stamp: float) -> Event:
+        """Whether the clock was set, or nothing is known of a time long enough to be carried elsewhere."""
+        step = stamp - self._stamp
+        if self._is_clock_set(stamp):
+            return Event.CLOCK_BACK
+        is_long = step > max(_LONG_SILENCE, _MANY_STEPS * self._period)
+        if is_long and self.odometry.longest_silence(self._stamp, stamp) > _LONG_SILENCE:
+            return Event.GAP
+        return Event.NONE
+
+    def _is_clock_set(self, stamp: float) -> bool:
+        return stamp < self._stamp - _CLOCK_STEP
 
     def _odometry_motion(self, now: FloatArray | None, step: float) -> FloatArray | None:
         """Motion since the last scan, unless no robot is that fast: odometry that is reset says nothing."""
@@ -158,6 +189,17 @@ class PoseExtrapolator:
         if now is not None and self._heading is not None:
             motion[2] = now - self._heading
         return motion
+
+
+def _has_begun_anew(before: FloatArray | None, now: FloatArray | None) -> bool:
+    """Whether odometry starts from zero again, as after the robot was switched off."""
+    if before is None or now is None:
+        return False
+    return _is_at_zero(now) and not _is_at_zero(before)
+
+
+def _is_at_zero(pose: FloatArray) -> bool:
+    return math.hypot(pose[0], pose[1]) < _ZERO_DISTANCE and abs(pose[2]) < _ZERO_TURN
 
 
 def _is_usual(step: float) -> bool:

@@ -1,30 +1,24 @@
 """Glass seen along the way: scans are looked at, every observation is bound to a node."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.config import GlassConfig, SensorConfig
 from glassslam.geometry import between, compose, transform_points, wrap_angle
-from glassslam.glass.layer import GlassLayer
 from glassslam.records import FloatArray, LaserScan
 from glassslam.slam.beam_errors import errors_of, true_detection
 from glassslam.slam.glass_choice import DetectorChoice
 from glassslam.slam.local import LocalResult
-from glassslam.slam.node import Node
 from glassslam.slam.range_data import base_motion
-from glassslam.slam.trajectory import PoseTracks
+from glassslam.slam.settled import GlassFindings
 
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
     from detectors.detection import Detection
     from glassslam.glass.beam_labels import BeamLabelLog
-    from glassslam.glass.beams import BeamEvidence
     from glassslam.glass.observations import GlassObservations
-
-    GlassSource: TypeAlias = Callable[[PoseTracks, BeamEvidence], GlassObservations]
 
 _COLUMNS = 10
 _NO_POINTS = np.empty((0, 2))
@@ -180,39 +174,12 @@ class GlassWatch:
             strength, probability, sigma, turn, extent, np.zeros(len(table), dtype=np.uint8),
         )  # fmt: skip
 
-    def layer(
-        self, nodes: list[Node], tracks: PoseTracks, others: "Sequence[GlassSource]" = ()
-    ) -> GlassLayer | None:
-        """Walls and observations at the optimised poses; None where no sensor looks for glass.
-
-        Parameters
-        ----------
-        nodes : list of Node
-            All nodes.
-        tracks : PoseTracks
-            Their poses.
-        others : sequence of callable
-            Sensors beside the lidar: from tracks and beams to observations bound to the nodes.
-        """
-        if self._choice.detect is None and not others:
+    def findings(self) -> GlassFindings | None:
+        """Everything found so far; None where the lidar is not asked for glass."""
+        if self._choice.detect is None:
             return None
-        from glassslam.glass.beams import BeamEvidence, Beams  # noqa: PLC0415
-        from glassslam.glass.ghosts import find_ghosts  # noqa: PLC0415
-        from glassslam.glass.observations import GlassObservations  # noqa: PLC0415
-        from glassslam.glass.walls import fit_walls  # noqa: PLC0415
-
-        sensors, poses = [node.sensor for node in nodes], tracks.nodes.poses
-        beams = BeamEvidence(
-            Beams.pack(sensors, [node.ends for node in nodes]),
-            Beams.pack(sensors, [node.free_ends for node in nodes]),
-        )
-        found = GlassObservations.joined([self.observations(), *(source(tracks, beams) for source in others)])
-        positions, normals = found.at(poses)
         labels = None if self._beams is None else self._beams.beams()
-        walls = tuple(fit_walls(found, poses, beams, self._config.walls))
-        ghosts = find_ghosts(walls, poses, beams, self._config.walls.distance_tolerance)
-        learnt = self._choice.calibration
-        return GlassLayer(walls, found, positions, normals, beams=labels, ghosts=ghosts, calibration=learnt)
+        return GlassFindings(self.observations(), labels, self._choice.calibration)
 
     def _catch_up(self) -> None:
         if self.is_decided:

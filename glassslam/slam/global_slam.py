@@ -1,5 +1,6 @@
 """Global SLAM: the pose graph, loop closures found beside local SLAM, and their optimisation."""
 
+import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,13 +16,16 @@ from glassslam.posegraph import PoseGraph
 from glassslam.posegraph.consistency import prune_closures
 from glassslam.posegraph.storage import LOOP
 from glassslam.records import FloatArray
-from glassslam.slam.closure import Candidate, Closure
+from glassslam.slam.closure import Candidate, Closure, SearchOutcome
+from glassslam.slam.journal import Journal, NoJournal
 from glassslam.slam.loop_closing import LoopSearcher, select
 from glassslam.slam.node import Node
+from glassslam.slam.rejoin import WEAK_STEP, move_stretches
 from glassslam.slam.stopwatch import Stages
 
 _LOOK_AHEAD = 45
 _DOUBT = 5.0
+_BREAK_WEIGHT = np.diag(1.0 / np.array(WEAK_STEP))
 
 
 class GlobalSlam:
@@ -39,25 +43,30 @@ class GlobalSlam:
         Searches made.
     rejected : Counter
         Reason -> searches that gave no closure.
+    outcomes : list of SearchOutcome
+        What became of every search, in their order.
     ambiguous : int
         Closures accepted that say nothing along one direction.
     solver_failures : int
         Optimisations that failed and left the poses as they were.
     """
 
-    def __init__(self, config: Config, stages: Stages) -> None:
+    def __init__(self, config: Config, stages: Stages, journal: Journal | None = None) -> None:
         self._config = config
         self._stages = stages
+        self._journal = journal or NoJournal()
         self.graph = PoseGraph()
         self.nodes: list[Node] = []
         self.submaps: list[Submap] = []
         self.searches = self.ambiguous = self.solver_failures = 0
+        self.outcomes: list[SearchOutcome] = []
         self.rejected: Counter[str] = Counter()
         self._travel: list[float] = []
         self._searched = 0
-        self._searcher = LoopSearcher(config.loop_closure)
+        self._hurried = threading.Event()
+        self._searcher = LoopSearcher(config.loop_closure, self._hurried.is_set)
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="loop-closing")
-        self._pending: Future[list[Closure]] | None = None
+        self._pending: Future[list[Closure]] | list[Closure] | None = None
         noise = config.optimization
         self._step_weight = np.diag(
             1.0
@@ -80,8 +89,12 @@ class GlobalSlam:
             step = between(last.pose_in_local, node.pose_in_local)
             self.graph.add_pose(compose(self.graph.poses[-1], step))
             weight = self._step_weight / (_DOUBT if node.doubtful else 1.0)
+            apart = 0.0
+            if node.begins:
+                # scans on either side of a break are never matched together
+                weight, apart = _BREAK_WEIGHT, 2.0 * self._config.loop_closure.neighbourhood + 1.0
             self.graph.add_constraints([last.index], [node.index], step[None], weight, "odometry")
-            self._travel.append(self._travel[-1] + float(np.hypot(step[0], step[1])))
+            self._travel.append(self._travel[-1] + float(np.hypot(step[0], step[1])) + apart)
         self.nodes.append(node)
         if len(self.nodes) % self._config.optimization.optimize_every_n_nodes == 0:
             self._round(len(self.nodes) - _LOOK_AHEAD)
@@ -104,6 +117,15 @@ class GlobalSlam:
                 huber_scale=limits.huber_scale,
             )
         self._pool.shutdown()
+
+    def hurry(self) -> None:
+        """Make no further searches; what they have found so far is used, and not written down."""
+        self._hurried.set()
+
+    @property
+    def is_hurried(self) -> bool:
+        """Whether searches are left out."""
+        return self._hurried.is_set()
 
     @contextmanager
     def _keeping_poses(self) -> Iterator[None]:
@@ -153,16 +175,16 @@ class GlobalSlam:
         self._collect()
         if not self._config.loop_closure.enabled or last <= self._searched:
             return
-        with self._stages.measure("loop closing"):
-            candidates = select(
-                self.graph, self.nodes, self.submaps, self._searched, last, self._config.loop_closure
-            )
-        self._searched = last
-        if candidates:
-            self.searches += len(candidates)
+        self._pending = self._journal.recall_round()
+        if self._pending is None:
+            with self._stages.measure("loop closing"):
+                candidates = select(
+                    self.graph, self.nodes, self.submaps, self._searched, last, self._config.loop_closure
+                )
             self._pending = self._pool.submit(
                 self._search, candidates, list(self.nodes), np.array(self._travel), list(self.submaps)
             )
+        self._searched = last
 
     def _search(
         self, candidates: Sequence[Candidate], nodes: list[Node], travel: FloatArray, submaps: list[Submap]
@@ -170,19 +192,33 @@ class GlobalSlam:
         with self._stages.measure("loop closing"):
             return self._searcher.search(candidates, nodes, travel, submaps)
 
+    def _found(self, search: "Future[list[Closure]]") -> list[Closure]:
+        """What a search in the background has found, written down if it came to its end."""
+        closures = search.result()
+        if not self.is_hurried:
+            self._journal.keep_round(closures)
+        return closures
+
     def _collect(self) -> None:
         """Enter what the last searches found, in their order, and optimise."""
         if self._pending is None:
             return
-        closures, self._pending = self._pending.result(), None
+        closures = self._pending if isinstance(self._pending, list) else self._found(self._pending)
+        self._pending = None
+        self.searches += len(closures)
+        self.outcomes += [SearchOutcome.of(closure) for closure in closures]
         self.rejected.update(closure.rejected for closure in closures if closure.rejected)
-        found = [closure for closure in closures if not closure.rejected]
+        weighed = [(closure, _root(closure.covariance)) for closure in closures if not closure.rejected]
+        found = [closure for closure, root in weighed if root is not None]
+        roots = [root for _, root in weighed if root is not None]
+        if len(found) < len(weighed):
+            self.rejected["not definite"] += len(weighed) - len(found)
         if not found:
             return
         self.ambiguous += sum(closure.ambiguous for closure in found)
         limits = self._config.optimization
         with self._stages.measure("optimisation"), self._keeping_poses():
-            roots = [np.linalg.cholesky(np.linalg.inv(closure.covariance)).T for closure in found]
+            move_stretches(self.graph, found, self.nodes, self._config.loop_closure)
             self.graph.add_constraints(
                 [closure.candidate.anchor for closure in found],
                 [closure.candidate.node for closure in found],
@@ -196,3 +232,12 @@ class GlobalSlam:
                 huber_scale=limits.huber_scale,
                 tolerance=1e-5,
             )
+
+
+def _root(covariance: FloatArray) -> FloatArray | None:
+    """Root W of the information of a closure, W^T W; None where the covariance has none."""
+    try:
+        root = np.asarray(np.linalg.cholesky(np.linalg.inv(covariance)).T)
+    except np.linalg.LinAlgError:
+        return None
+    return root if np.isfinite(root).all() else None

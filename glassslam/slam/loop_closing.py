@@ -1,8 +1,9 @@
 """Which searches to make for loop closures, and making them beside local SLAM."""
 
 import math
-from collections import OrderedDict
-from collections.abc import Sequence
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Sequence
+from itertools import takewhile
 
 import numpy as np
 
@@ -12,13 +13,15 @@ from glassslam.grid.submap import Submap
 from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
 from glassslam.posegraph import PoseGraph
 from glassslam.records import FloatArray
-from glassslam.slam.closure import Candidate, Closure, close, needs_search
+from glassslam.slam.closure import Candidate, Closure, close, is_wide, needs_search
 from glassslam.slam.neighbourhood import neighbourhood, neighbours
 from glassslam.slam.node import Node
+from glassslam.slam.rejoin import agreeing, beginnings
 
 _NEAR = 4.0
 _FARTHEST_CANDIDATE = 25.0
 _LINEAR_MARGIN, _ANGULAR_MARGIN = 0.1, 0.03
+_MOST_WIDE = 24
 _CACHED_BYTES = 16_000_000
 CHI_SQUARE_LIMIT = 20.0
 
@@ -34,22 +37,26 @@ def select(
     """Searches for the nodes `first` .. `last` - 1 in finished submaps.
 
     A search is made where the graph, within three standard deviations and a few metres, allows that
-    the node sees the submap; its window follows from the covariance of the node in the submap.
+    the node sees the submap; its window follows from the covariance of the node in the submap. Across a
+    break of the recording it may reach all around, and no number of nodes lies between.
     """
-    poses = graph.poses
+    poses, begins = graph.poses, beginnings(nodes)
     pairs: list[tuple[int, int, int, float]] = []
     for submap in submaps:
-        queries = np.arange(max(first, submap.nodes[-1] + config.min_node_gap + 1), last)
+        end = submap.nodes[-1]
+        nearest = min([end + config.min_node_gap + 1, *(begin for begin in begins if begin > end)])
+        queries = np.arange(max(first, nearest), last)
         pairs += _nearest_pairs(poses, queries, submap, config)
     if not pairs:
         return []
     covariances = graph.relative_covariances([(anchor, node) for node, anchor, _, _ in pairs])
-    chosen = []
+    chosen, widest = [], math.radians(config.max_angular_window_deg)
     for (node, anchor, submap_index, distance), covariance in zip(pairs, covariances, strict=True):
         spread = 3.0 * math.sqrt(max(covariance[0, 0], covariance[1, 1]))
         if distance > _NEAR + spread:
             continue
         turn = 3.0 * math.sqrt(covariance[2, 2])
+        is_across = any(anchor < begin <= node for begin in begins)
         chosen.append(
             Candidate(
                 node,
@@ -58,11 +65,24 @@ def select(
                 nodes[anchor].pose_in_local,
                 between(poses[anchor], poses[node]),
                 min(config.max_linear_window, spread + _LINEAR_MARGIN),
-                min(math.radians(config.max_angular_window_deg), turn + _ANGULAR_MARGIN),
+                min(math.pi if is_across else widest, turn + _ANGULAR_MARGIN),
                 covariance,
             )
         )
-    return chosen
+    return _few_wide(chosen, config)
+
+
+def _few_wide(candidates: Sequence[Candidate], config: LoopClosureConfig) -> list[Candidate]:
+    """The candidates, of the wide ones those nearest to their submaps: each costs as much as many others."""
+    seen: Counter[int] = Counter()
+    ranks = {}
+    for k, candidate in enumerate(candidates):
+        if is_wide(candidate, config):
+            distance = math.hypot(*candidate.anchor_from_node[:2].tolist())
+            ranks[k] = (seen[candidate.submap], distance)
+            seen[candidate.submap] += 1
+    dropped = set(sorted(ranks, key=ranks.__getitem__)[_MOST_WIDE:])
+    return [candidate for k, candidate in enumerate(candidates) if k not in dropped]
 
 
 def _nearest_pairs(
@@ -95,10 +115,19 @@ def _may_be_near(a: FloatArray, b: FloatArray) -> bool:
 
 
 class LoopSearcher:
-    """Makes searches one after another; runs in one background thread."""
+    """Makes searches one after another; runs in one background thread.
 
-    def __init__(self, config: LoopClosureConfig) -> None:
+    Parameters
+    ----------
+    config : LoopClosureConfig
+        Gates and windows.
+    is_hurried : callable
+        Asked before every search whether to leave out this one and all that follow.
+    """
+
+    def __init__(self, config: LoopClosureConfig, is_hurried: Callable[[], bool] = lambda: False) -> None:
         self._config = config
+        self._is_hurried = is_hurried
         self._matchers: OrderedDict[int, BranchAndBoundMatcher] = OrderedDict()
 
     def search(
@@ -108,8 +137,12 @@ class LoopSearcher:
         travel: FloatArray,
         submaps: Sequence[Submap],
     ) -> list[Closure]:
-        """Results of all candidates, in their order."""
-        return [self._close(candidate, nodes, travel, submaps) for candidate in candidates]
+        """Results of all candidates, in their order; of the first ones where it is told to hurry."""
+        closures = [
+            self._close(candidate, nodes, travel, submaps)
+            for candidate in takewhile(lambda _: not self._is_hurried(), candidates)
+        ]
+        return agreeing(closures, nodes, self._config)
 
     def _close(
         self, candidate: Candidate, nodes: list[Node], travel: FloatArray, submaps: Sequence[Submap]

@@ -7,24 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from glassslam.config import Config
-from glassslam.errors import NoScansError
+from glassslam.errors import NoScansError, SessionError
 from glassslam.geometry import compose
 from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
-from glassslam.slam.extrapolator import PoseExtrapolator
-from glassslam.slam.glass_watch import GlassWatch
+from glassslam.slam.extrapolator import PoseExtrapolator, Prediction
+from glassslam.slam.glass_watch import GlassWatch, Look
 from glassslam.slam.global_slam import GlobalSlam
+from glassslam.slam.journal import Journal, NoJournal, ScanOutcome
 from glassslam.slam.local import LocalResult, LocalSlam, prepared
-from glassslam.slam.range_data import prepare
-from glassslam.slam.render import Rendering, render, render_run
-from glassslam.slam.result import MapResult, OccupancyMap
+from glassslam.slam.range_data import RangeData, prepare
+from glassslam.slam.result import MapResult
 from glassslam.slam.scan_check import checked_mount, defect, mended, sweep_time
 from glassslam.slam.scan_queue import ScanQueue, TimedScan
+from glassslam.slam.settled import SettledRun, draw
 from glassslam.slam.stopwatch import Stages
 from glassslam.slam.tally import Tally, run_statistics
 from glassslam.slam.trajectory import PoseTracks, corrected_poses
 
 if TYPE_CHECKING:
-    from glassslam.slam.glass_watch import GlassSource
+    from glassslam.slam.settled import GlassSource
 
 
 class Mapper:
@@ -36,6 +37,8 @@ class Mapper:
         All parameters.
     base_from_laser : array_like, shape (3,)
         Pose (x, y, yaw) of the laser in the frame of the base, m and rad.
+    journal : Journal, optional
+        Outcomes of an earlier run of the same records, and where those of this one are written down.
 
     Examples
     --------
@@ -49,14 +52,20 @@ class Mapper:
     (3, 3)
     """
 
-    def __init__(self, config: Config | None = None, base_from_laser: object = (0.0, 0.0, 0.0)) -> None:
+    def __init__(
+        self,
+        config: Config | None = None,
+        base_from_laser: object = (0.0, 0.0, 0.0),
+        journal: Journal | None = None,
+    ) -> None:
         self._config = config or Config()
         self._base_from_laser = checked_mount(base_from_laser)
         self._stages = Stages()
         self._extrapolator = PoseExtrapolator()
         self._waiting = ScanQueue(self._extrapolator.odometry)
         self._local = LocalSlam(self._config)
-        self._global = GlobalSlam(self._config, self._stages)
+        self._journal = journal or NoJournal()
+        self._global = GlobalSlam(self._config, self._stages, self._journal)
         self._poses: list[FloatArray] = []
         self._corrections: list[FloatArray] = []
         self._tally = Tally()
@@ -88,19 +97,17 @@ class Mapper:
         info : RecordingInfo, optional
             The source, for the report.
         glass_sources : sequence of callable
-            Sensors beside the lidar that see glass: from the poses of the run and the beams of the lidar to
-            observations bound to the nodes.
+            Sensors beside the lidar that see glass; see `draw`.
 
         Raises
         ------
         NoScansError
             Not one usable scan came in, or not one had a return.
         """
-        self.settle()
-        return self.drawn(info, glass_sources)
+        return draw(self.settle(), info, glass_sources)
 
-    def settle(self) -> None:
-        """Process what waits, close the last loops and optimise: the first half of `finish`.
+    def settle(self) -> SettledRun:
+        """Process what waits, close the last loops and optimise: `finish` without drawing maps.
 
         Raises
         ------
@@ -115,32 +122,21 @@ class Mapper:
             self._global.finish()
         finally:
             self.close()
-
-    def drawn(
-        self, info: RecordingInfo | None = None, glass_sources: "Sequence[GlassSource]" = ()
-    ) -> MapResult:
-        """Glass and maps of a run that is settled; they may be drawn again with other sensors.
-
-        Parameters
-        ----------
-        info : RecordingInfo, optional
-            The source, for the report.
-        glass_sources : sequence of callable
-            As for `finish`.
-        """
-        tracks = self._tracks()
         with self._stages.measure("glass"):
             self._glass.settle()
-            layer = self._glass.layer(self._global.nodes, tracks, glass_sources)
-        with self._stages.measure("rendering"):
-            rendering = render_run(self._global, layer, self._config, closed=len(glass_sources) > 0)
-        return self._result(rendering, tracks, info)
+        return self._settled()
 
-    def returns_map(self) -> OccupancyMap:
-        """Map of a run that is settled, in which beams without echo clear nothing."""
-        world = self._global
-        nodes = [replace(node, free_ends=node.free_ends[:0]) for node in world.nodes]
-        return render(nodes, world.poses, self._config.map)
+    def hurry(self) -> None:
+        """Make no further searches for loop closures and write nothing more down; from any thread.
+
+        What follows, `settle` above all, makes the best of what there is, and is no part of the run.
+        """
+        self._global.hurry()
+
+    @property
+    def is_hurried(self) -> bool:
+        """Whether the run was told to hurry."""
+        return self._global.is_hurried
 
     def close(self) -> None:
         """Stop background work; without `finish` this gives the run up."""
@@ -160,8 +156,8 @@ class Mapper:
         with self._stages.measure("local SLAM"):
             placed = [self._place(scan) for scan in scans]
         for result in placed:
-            if result.finished is not None:
-                self._global.add_submap(result.finished)
+            for submap in result.finished:
+                self._global.add_submap(submap)
             if result.node is not None:
                 self._global.add_node(result.node)
 
@@ -169,18 +165,50 @@ class Mapper:
         scan, time, odometry = timed.scan, timed.time, timed.odometry_pose
         prediction = self._extrapolator.predict(time, odometry)
         look = self._glass.look(scan, prediction.twist)
-        behind = None if self._config.glass.ghosts_in_matching else look.behind_glass()
-        data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor, behind)
-        thinned = prepared(data, self._config.filter.voxel_filter_size)
-        result = self._local.add(thinned, prediction, look.points)
+        known = self._journal.recall_scan()
+        if known is None:
+            result, returns = self._matched(scan, prediction, look)
+        else:
+            result, returns = self._repeated(known, scan, prediction, look)
         self._extrapolator.add_pose(
             time, result.pose_in_local, odometry, 0.5 * sweep_time(scan), prediction.twist
         )
         self._poses.append(result.pose_in_local)
         self._corrections.append(self._local.locks.map_from_local)
         self._glass.add(look, result)
-        self._tally.place(scan, len(data.returns) + len(data.ghosts), with_odometry=odometry is not None)
+        self._tally.place(scan, returns, with_odometry=odometry is not None)
         return result
+
+    def _matched(self, scan: LaserScan, prediction: Prediction, look: Look) -> tuple[LocalResult, int]:
+        """Local SLAM for a scan, and the number of its returns."""
+        data = self._range_data(scan, prediction, look)
+        returns = len(data.returns) + len(data.ghosts)
+        match = self._local.match(data, prediction)
+        result = self._local.enter(match, data, look.points)
+        if not self.is_hurried:
+            outcome = ScanOutcome(match, replace(self._local.tracking), returns, result.node is not None)
+            self._journal.keep_scan(scan.stamp, outcome, result.node)
+        return result, returns
+
+    def _repeated(
+        self, known: ScanOutcome, scan: LaserScan, prediction: Prediction, look: Look
+    ) -> tuple[LocalResult, int]:
+        """The same with what is known of it from before; only nodes need their points."""
+        nothing = np.empty((0, 2))
+        data = RangeData(scan.stamp, self._base_from_laser[:2], nothing, nothing)
+        if known.is_node:
+            data = self._range_data(scan, prediction, look)
+        self._local.tracking = replace(known.tracking)
+        result = self._local.enter(known.match, data, look.points)
+        if (result.node is not None) != known.is_node:
+            raise SessionError("the session is not of this recording", "map the recording again")
+        return result, known.returns
+
+    def _range_data(self, scan: LaserScan, prediction: Prediction, look: Look) -> RangeData:
+        """Returns and free rays of a scan, thinned."""
+        behind = None if self._config.glass.ghosts_in_matching else look.behind_glass()
+        data = prepare(scan, self._base_from_laser, prediction.twist, self._config.sensor, behind)
+        return prepared(data, self._config.filter.voxel_filter_size)
 
     def _check_seen(self) -> None:
         if not self._poses:
@@ -197,25 +225,24 @@ class Mapper:
         nodes, poses = self._global.nodes, self._global.poses
         local, stamps = np.array(self._poses), np.array(self._tally.stamps)
         scans, in_local = np.array([node.scan for node in nodes]), np.array([n.pose_in_local for n in nodes])
+        begins = np.array([node.begins for node in nodes])
         return PoseTracks(
             local=Trajectory(stamps, local),
             partial=Trajectory(stamps, compose(np.array(self._corrections), local)),
             nodes=Trajectory(np.array([node.stamp for node in nodes]), np.array(poses)),
-            final=Trajectory(stamps, corrected_poses(local, scans, in_local, poses)),
+            final=Trajectory(stamps, corrected_poses(local, scans, in_local, poses, begins)),
         )
 
-    def _result(self, rendering: Rendering, tracks: PoseTracks, info: RecordingInfo | None) -> MapResult:
-        return MapResult(
-            map=rendering.map,
-            lidar_map=rendering.lidar,
-            closed_map=rendering.closed,
-            tracks=tracks,
-            submap_nodes=tuple(submap.nodes[0] for submap in self._global.submaps),
-            constraints=self._global.graph.constraints,
+    def _settled(self) -> SettledRun:
+        return SettledRun(
             config=self._config,
+            nodes=tuple(self._global.nodes),
+            submaps=tuple(self._global.submaps),
+            constraints=self._global.graph.constraints,
+            tracks=self._tracks(),
             statistics=run_statistics(
-                self._tally, self._extrapolator, self._local, self._global, self._stages, self._glass.choice
+                self._tally, self._extrapolator, self._local, self._global, self._glass.choice
             ),
-            info=info,
-            glass=rendering.glass,
+            glass=self._glass.findings(),
+            stages=self._stages,
         )

@@ -36,6 +36,8 @@ class Node:
         relocalisation, or odometry overruled.
     ghosts : ndarray of float32, shape (g, 2)
         Returns from behind glass that are kept out of matching, in the frame of the base, m.
+    begins : bool
+        Whether a new stretch of the run begins here: where it lies to the nodes before is hardly known.
     """
 
     index: int
@@ -48,6 +50,7 @@ class Node:
     residual: float
     doubtful: bool = False
     ghosts: Float32Array = field(default_factory=_no_points)
+    begins: bool = False
 
     @property
     def ends(self) -> Float32Array:

@@ -95,6 +95,12 @@ class OdometryTrack:
         before, after = self._stamps[k], self._stamps[k + 1]
         return interpolate(self._poses[k], self._poses[k + 1], (stamp - before) / (after - before))
 
+    def longest_silence(self, start: float, end: float) -> float:
+        """Longest time without a pose between two stamps, s."""
+        first = bisect_right(self._stamps, start, lo=self._rising)
+        last = bisect_right(self._stamps, end, lo=first)
+        return float(np.diff([start, *self._stamps[first:last], end]).max())
+
     def _enclosing(self, stamp: float) -> int:
         """Newest index whose pose and the next one enclose a stamp before the latest; -1 when none do."""
         k = bisect_right(self._stamps, stamp, lo=self._rising) - 1

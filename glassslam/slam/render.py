@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.config import Config, MapConfig
+from glassslam.config import MapConfig
 from glassslam.geometry import compose, inverse, transform_points
 from glassslam.glass.layer import GlassLayer, locked, wall_cells
 from glassslam.grid.probability_grid import OddsModel, ProbabilityGrid
 from glassslam.records import Float32Array, FloatArray
 from glassslam.slam.ghost_rays import visible_rays
 from glassslam.slam.glass_locks import locks_submaps
-from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.node import Node
 from glassslam.slam.paint import paint_submaps
 from glassslam.slam.result import OccupancyMap
@@ -22,6 +21,7 @@ from glassslam.slam.silence import occupied_where_silent
 
 if TYPE_CHECKING:  # runs that do not look for glass need not load what finds it
     from glassslam.glass.ghosts import Ghosts, Kept
+    from glassslam.slam.settled import SettledRun
 
 Rays: TypeAlias = tuple[Float32Array, Float32Array]
 
@@ -50,37 +50,34 @@ class Rendering:
     closed: OccupancyMap | None = None
 
 
-def render_run(
-    world: GlobalSlam, glass: GlassLayer | None, config: Config, *, closed: bool = False
-) -> Rendering:
+def render_run(run: "SettledRun", glass: GlassLayer | None, *, closed: bool = False) -> Rendering:
     """Map of a finished run, with its glass locked as the scheme says.
 
     Parameters
     ----------
-    world : GlobalSlam
-        Nodes, submaps and optimised poses.
+    run : SettledRun
+        Nodes, submaps, optimised poses and configuration.
     glass : GlassLayer or None
         Glass found; None when it was not looked for.
-    config : Config
-        Resolution, odds and scheme.
     closed : bool
         Whether to draw the map in which no beam goes through glass as well.
     """
+    config, nodes, poses = run.config, run.nodes, run.tracks.nodes.poses
     if glass is None:
-        grid = render(world.nodes, world.poses, config.map)
+        grid = render(nodes, poses, config.map)
         return Rendering(grid, grid, None)
     shut = None
     if closed:
-        shut = _locked(_closed(world, glass, config.map), glass)
+        shut = _locked(_closed(run, glass), glass)
     if locks_submaps(config.glass.scheme):
-        first = [submap.nodes[0] for submap in world.submaps]
-        local = np.array([world.nodes[k].pose_in_local for k in first])
-        moves = compose(world.poses[first], inverse(local))
-        grid, cells = paint_submaps(world.submaps, moves, config.map.resolution)
-        layer = _with_ghost_cells(replace(glass, locked_cells=cells), world, grid)
-        return Rendering(grid, render(world.nodes, world.poses, config.map), layer, shut)
-    grid = render(world.nodes, world.poses, config.map, glass.ghosts, config.glass.ghosts_in_map)
-    layer = _with_ghost_cells(glass, world, grid)
+        first = [submap.nodes[0] for submap in run.submaps]
+        local = np.array([nodes[k].pose_in_local for k in first])
+        moves = compose(poses[first], inverse(local))
+        grid, cells = paint_submaps(run.submaps, moves, config.map.resolution)
+        layer = _with_ghost_cells(replace(glass, locked_cells=cells), run, grid)
+        return Rendering(grid, render(nodes, poses, config.map), layer, shut)
+    grid = render(nodes, poses, config.map, glass.ghosts, config.glass.ghosts_in_map)
+    layer = _with_ghost_cells(glass, run, grid)
     if config.glass.scheme == "off":
         return Rendering(grid, grid, layer, shut)
     mask = _wall_mask(grid, glass)
@@ -127,9 +124,9 @@ def _drawn(nodes: Sequence[Node], poses: FloatArray, config: MapConfig, rays: It
     return OccupancyMap(grid.probability(), config.resolution, (float(grid.origin[0]), float(grid.origin[1])))
 
 
-def _closed(world: GlobalSlam, glass: GlassLayer, config: MapConfig) -> OccupancyMap:
+def _closed(run: "SettledRun", glass: GlassLayer) -> OccupancyMap:
     """Map in which no beam goes through glass, and silence clears only where it tells of free space."""
-    nodes, poses = world.nodes, world.poses
+    nodes, poses, config = run.nodes, run.tracks.nodes.poses, run.config.map
     rays = list(visible_rays(nodes, glass.ghosts, "none"))
     silent = [len(node.free_ends) for node in nodes]
     parts = [(free[:count], free[count:]) for count, (_, free) in zip(silent, rays, strict=True)]
@@ -169,16 +166,18 @@ def _wall_mask(grid: OccupancyMap, layer: GlassLayer) -> NDArray[np.bool_]:
     return wall_cells(layer.walls, shape, grid.origin, grid.resolution)
 
 
-def _with_ghost_cells(layer: GlassLayer, world: GlobalSlam, grid: OccupancyMap) -> GlassLayer:
+def _with_ghost_cells(layer: GlassLayer, run: "SettledRun", grid: OccupancyMap) -> GlassLayer:
     """The layer with the cells of the map in which nothing but ghosts ends."""
     if layer.ghosts is None:
         return layer
     from glassslam.glass.beams import Beams  # noqa: PLC0415  (only runs that look for glass need it)
     from glassslam.glass.ghosts import ghost_cells  # noqa: PLC0415
 
-    returns = Beams.pack([node.sensor for node in world.nodes], [node.ends for node in world.nodes])
+    returns = Beams.pack([node.sensor for node in run.nodes], [node.ends for node in run.nodes])
     shape = (grid.probability.shape[0], grid.probability.shape[1])
-    mask = ghost_cells(layer.ghosts.labels, world.poses, returns, shape, grid.origin, grid.resolution)
+    mask = ghost_cells(
+        layer.ghosts.labels, run.tracks.nodes.poses, returns, shape, grid.origin, grid.resolution
+    )
     return replace(layer, ghost_cells=_centres(mask, grid))
 
 

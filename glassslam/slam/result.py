@@ -1,15 +1,21 @@
 """What a finished run hands to the outputs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.config import Config
+from glassslam.config import Config, VolumeConfig
 from glassslam.glass.layer import GlassLayer
 from glassslam.posegraph.graph import Constraint
 from glassslam.records import Damage, Float32Array, FloatArray, RecordingInfo, Trajectory
+from glassslam.slam.node import Node
 from glassslam.slam.trajectory import PoseTracks
+
+if TYPE_CHECKING:  # volumes are made of results; results only hold them
+    from glassslam.volume.octree import Octree
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +122,39 @@ class SonarMaps:
 
 
 @dataclass(frozen=True, slots=True)
+class VolumeMaps:
+    """What the 3D ultrasonic sensors of a run add.
+
+    Attributes
+    ----------
+    tree : Octree
+        Voxels of lidar and points together, in the map frame, heights above the base.
+    config : VolumeConfig
+        How it was made.
+    map : OccupancyMap
+        The voxels of the band of heights seen from above.
+    lidar_height : float
+        Height of the plane of the lidar, m.
+    counts : dict
+        "scans", "point_sets", "points", "pairs" -> how many were used; of the scans, those that are nodes.
+    dropped : dict
+        Reason -> number of pings or points that were not used.
+    """
+
+    tree: "Octree"
+    config: VolumeConfig
+    map: OccupancyMap
+    lidar_height: float
+    counts: Mapping[str, int]
+    dropped: Mapping[str, int]
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest height that goes into the map, m above the base."""
+        return self.config.band_low, self.config.band_high
+
+
+@dataclass(frozen=True, slots=True)
 class MapResult:
     """Everything a run found out.
 
@@ -143,6 +182,10 @@ class MapResult:
         Glass walls and observations; None when glass was not looked for.
     sonar : SonarMaps or None
         Maps of the sonars and of lidar and sonar together; None without sonar.
+    nodes : tuple of Node
+        The scans that went into the map.
+    volume : VolumeMaps or None
+        Voxels of the lidar and of the points of 3D ultrasonic sensors; None without points.
     """
 
     map: OccupancyMap
@@ -156,6 +199,8 @@ class MapResult:
     info: RecordingInfo | None = None
     glass: GlassLayer | None = None
     sonar: SonarMaps | None = None
+    nodes: tuple[Node, ...] = ()
+    volume: VolumeMaps | None = None
 
     @property
     def trajectory(self) -> Trajectory:

@@ -9,7 +9,6 @@ from glassslam.slam.glass_choice import DetectorChoice
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalSlam
 from glassslam.slam.result import RunStatistics
-from glassslam.slam.stopwatch import Stages
 
 _FEW = 0.1
 
@@ -55,7 +54,6 @@ def run_statistics(
     extrapolator: PoseExtrapolator,
     local: LocalSlam,
     world: GlobalSlam,
-    stages: Stages,
     glass: DetectorChoice,
 ) -> RunStatistics:
     """Everything the report tells of a finished run."""
@@ -70,7 +68,6 @@ def run_statistics(
         scans_dropped=dict(sorted(tally.dropped.items())),
         messages_dropped={"odometry not finite": not_finite} if not_finite else {},
         recording_seconds=float(max(tally.stamps) - min(tally.stamps)),
-        stages=dict(sorted(stages.times.items())),
         nodes=len(world.nodes),
         submaps=len(world.submaps),
         closures_tried=world.searches,
@@ -100,8 +97,8 @@ def _warnings(tally: Tally, extrapolator: PoseExtrapolator, local: LocalSlam) ->
         )
     if extrapolator.jumps:
         warnings.append(f"odometry jumped {extrapolator.jumps} times; those steps are not used")
-    if local.unmatched:
+    if unmatched := local.tracking.unmatched:
         warnings.append(
-            f"{local.unmatched} of {used} scans had too few returns to match: their poses are predictions"
+            f"{unmatched} of {used} scans had too few returns to match: their poses are predictions"
         )
     return warnings

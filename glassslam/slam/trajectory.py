@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from glassslam.geometry import between, compose, interpolate
 from glassslam.records import FloatArray, Trajectory
@@ -33,7 +34,11 @@ class PoseTracks:
 
 
 def corrected_poses(
-    local_poses: FloatArray, node_scans: np.ndarray, node_local_poses: FloatArray, node_poses: FloatArray
+    local_poses: FloatArray,
+    node_scans: np.ndarray,
+    node_local_poses: FloatArray,
+    node_poses: FloatArray,
+    node_begins: NDArray[np.bool_] | None = None,
 ) -> FloatArray:
     """Poses of all scans in the map frame, shape (n, 3).
 
@@ -48,12 +53,16 @@ def corrected_poses(
         Ascending numbers of the scans that are nodes.
     node_local_poses, node_poses : ndarray of float64, shape (k, 3)
         Poses of the nodes by local SLAM and after optimisation.
+    node_begins : ndarray of bool, shape (k,), optional
+        Nodes that no scan before them goes along with: the first of a stretch.
     """
     if len(node_scans) == 0:
         return local_poses.copy()
     scans = np.arange(len(local_poses))
     before = np.clip(np.searchsorted(node_scans, scans, side="right") - 1, 0, len(node_scans) - 1)
     after = np.minimum(before + 1, len(node_scans) - 1)
+    if node_begins is not None:
+        after = np.where(node_begins[after], before, after)
     by_before = compose(node_poses[before], between(node_local_poses[before], local_poses))
     by_after = compose(node_poses[after], between(node_local_poses[after], local_poses))
     return interpolate(by_before, by_after, _progress(local_poses, node_scans[before], node_scans[after]))

@@ -161,4 +161,6 @@ def _info(bags: Sequence[Bag], found: Survey, options: SourceOptions) -> Recordi
         no_echo=found.no_echo.value,
         sonar_ring=found.sonar.ring,
         sonar_topics=found.sonar.names,
+        points_topics=found.sonar.points_names,
+        laser_height=found.laser_height,
     )

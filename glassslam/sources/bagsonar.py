@@ -1,6 +1,6 @@
 """What must be known of the sonars in bags before their records can be streamed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 
 import numpy as np
@@ -23,7 +23,7 @@ from glassslam.sources.sonarsamples import (
     stretch,
     stretches,
 )
-from glassslam.sources.sonartopics import sonar_topics
+from glassslam.sources.sonartopics import is_named, sonar_topics
 from glassslam.sources.sweeps import Series, sweep_rule
 from glassslam.sources.topics import describe
 from glassslam.sources.transforms import TransformTree, frame_name
@@ -74,13 +74,14 @@ def plan_sonar(
         if ring is not None and not options.without_sonar:
             raise UsageError("a sonar ring was named, but there is no sonar in the recording")
         return NO_SONAR
+    planner = _Planner(bags, chosen, transforms, base, options, ring, seconds)
     try:
-        return _Planner(bags, chosen, transforms, base, options, ring, seconds).run()
+        return planner.run()
     except UsageError as error:
         if required or options.sonar_topics or ring is not None:
             raise
         hint = f" ({error.hint})" if error.hint else ""
-        return SonarPlan(None, None, (), (), {}, {}, (f"sonar is not used: {error.message}{hint}",))
+        return planner.points_alone(f"sonar is not used: {error.message}{hint}")
 
 
 class _Planner:
@@ -101,20 +102,24 @@ class _Planner:
         self._transforms = transforms
         self._warnings: list[str] = []
         self._matrices: dict[str, FloatArray] = {}
+        self._points: tuple[Topic, ...] = ()
 
     def run(self) -> SonarPlan:
         ranges = [topic for topic in self._chosen if topic.msgtype == RANGE]
         clouds = {topic: self._clouds(topic) for topic in self._chosen if topic.msgtype in POINTS_OF}
         rings = {topic: self._ring_of(topic, found) for topic, found in clouds.items()}
         arrays = [topic for topic in self._chosen if topic.msgtype == RANGE_ARRAY]
-        points = tuple(topic for topic, found in clouds.items() if found and rings[topic] is None)
+        self._points = tuple(
+            topic for topic, found in clouds.items() if self._gives_points(topic, found, rings)
+        )
         sweeps = [*(topic for topic in clouds if rings[topic] is not None), *arrays]
         if ranges:
             # What drivers publish beside single ranges is the same again.
             tree, base, ring = self._tree, self._base, self._ring
-            plan = plan_ranges(ranges, partial(stretches, self._bags), tree, base, ring, wished=self._wished)
+            wished = bool(self._options.sonar_topics)
+            plan = plan_ranges(ranges, partial(stretches, self._bags), tree, base, ring, wished=wished)
             if plan is not None:
-                return self._finished(plan.ring, plan, points)
+                return self._finished(plan.ring, plan)
         if len(sweeps) > 1:
             raise UsageError(
                 f"several sonar topics: {describe(sweeps, self._seconds)}", "choose one with --sonar-topic"
@@ -122,25 +127,36 @@ class _Planner:
         if not sweeps:
             if self._ring is not None:
                 raise UsageError(f"no sonar in the recording fits the ring {self._ring.name}", RING_HINT)
-            return self._finished(None, NO_SONAR, points)
+            return self._finished(None, NO_SONAR)
         (topic,) = sweeps
         known = rings.get(topic)
         found, series = self._array(topic) if known is None else (known, cloud_series(clouds[topic], known))
         plan = SonarPlan(found, sweep_rule(found, series), (topic,), (), {}, {})
-        return self._finished(found, plan, points)
+        return self._finished(found, plan)
+
+    def points_alone(self, warning: str) -> SonarPlan:
+        """The points that `run` has found before it failed."""
+        self._warnings.append(warning)
+        return self._finished(None, NO_SONAR)
 
     @cached_property
     def _tree(self) -> TransformTree:
         return read_tree(self._bags, self._transforms, [])
 
-    @property
-    def _wished(self) -> bool:
-        return bool(self._options.sonar_topics)
+    def _is_wished(self, topic: Topic) -> bool:
+        return is_named(topic, (*self._options.sonar_topics, *self._options.points_topics))
 
-    def _finished(self, ring: SonarRing | None, plan: SonarPlan, points: tuple[Topic, ...]) -> SonarPlan:
-        return SonarPlan(
-            ring, plan.rule, plan.ring_topics, points, plan.sensors, self._matrices, tuple(self._warnings)
-        )
+    def _gives_points(
+        self, topic: Topic, found: Sequence[Stretch], rings: Mapping[Topic, SonarRing | None]
+    ) -> bool:
+        """Whether the clouds of a topic are points of a 3D sensor, and wanted."""
+        options = self._options
+        wanted = not options.points_topics or is_named(topic, options.points_topics)
+        return bool(found) and rings[topic] is None and wanted and not options.without_points
+
+    def _finished(self, ring: SonarRing | None, plan: SonarPlan) -> SonarPlan:
+        matrices, warnings = self._matrices, tuple(self._warnings)
+        return SonarPlan(ring, plan.rule, plan.ring_topics, self._points, plan.sensors, matrices, warnings)
 
     def _array(self, topic: Topic) -> tuple[SonarRing, list[Series]]:
         """The ring of a topic of plain numbers, which only the user can know."""
@@ -160,7 +176,7 @@ class _Planner:
 
     def _clouds(self, topic: Topic) -> list[Stretch]:
         """Stretches of clouds in the base frame; none when the topic is no sonar."""
-        if not self._wished and self._is_dense(topic):
+        if not self._is_wished(topic) and self._is_dense(topic):
             return []
         moved = []
         for times, framed in stretches(self._bags, topic, partial(framed_points, topic)):
@@ -191,10 +207,12 @@ class _Planner:
 
     def _ring_of(self, topic: Topic, found: Sequence[Stretch]) -> SonarRing | None:
         """The ring behind a topic of clouds; None when they are points of a 3D sensor."""
+        if is_named(topic, self._options.points_topics):
+            return None
         everything = [cloud for _, clouds in found for cloud in clouds]
         sizes = [len(cloud) for cloud in everything]
         ring = self._ring
-        if ring is not None and self._wished:
+        if ring is not None and is_named(topic, self._options.sonar_topics):
             self._check_size(topic, ring, set(sizes))
         if ring is not None and len(ring.poses) == max(set(sizes), key=sizes.count, default=0):
             return ring

@@ -38,6 +38,7 @@ class BagSonarFile(SonarFile):
                 f"no sonar in {piece.path}", f"recorded: {describe(filled, seconds) or 'nothing'}"
             )
         self.path, self.ring, self.topics = piece.path, self._plan.ring, self._plan.names
+        self.points_topics = self._plan.points_names
         self.span = self._bag.start / 1e9, self._bag.end / 1e9
         self.rule, self.warnings = self._plan.rule, self._plan.warnings
 

@@ -68,6 +68,8 @@ class Survey:
         How sonars are read.
     warnings : tuple of str
         What a user should know.
+    laser_height : float or None
+        Height of the laser above the base, m; None when no transform tells it.
     """
 
     choice: Choice
@@ -81,6 +83,7 @@ class Survey:
     share: float
     sonar: SonarPlan
     warnings: tuple[str, ...]
+    laser_height: float | None = None
 
     @property
     def odom_name(self) -> str:
@@ -150,6 +153,8 @@ class _Surveyor:
             share=min(1.0, (stop - start) / (end + 1 - begin)),
             sonar=sonar,
             warnings=(*self._warnings, *sonar.warnings),
+            # a laser that is its own base is of no known height
+            laser_height=None if tree.lookup(base, laser) is None or base == laser else float(matrix[2, 3]),
         )
 
     def _check_order(self) -> None:

@@ -4,13 +4,14 @@ import math
 from collections.abc import Iterator, Sequence
 
 from glassslam.errors import UsageError
-from glassslam.records import LaserScan, Odometry, Record, RecordingInfo
+from glassslam.records import Damage, LaserScan, Odometry, Record, RecordingInfo
 from glassslam.sources.carmenlines import ODOM, LaserLine, NumberReader, Pose, parse_laser, parse_odom
 from glassslam.sources.carmensurvey import CarmenSurvey, carmen_lines, survey
 from glassslam.sources.formats import Piece
 from glassslam.sources.messages import BAD_ODOMETRY, UnusableMessageError, upper_limit
 from glassslam.sources.options import SourceOptions
 from glassslam.sources.recording import Recording
+from glassslam.sources.textlines import TextLog
 
 
 def open_carmen(pieces: Sequence[Piece], options: SourceOptions) -> "CarmenRecording":
@@ -25,6 +26,8 @@ def open_carmen(pieces: Sequence[Piece], options: SourceOptions) -> "CarmenRecor
         raise UsageError(f"imu topic {options.imu_topic} is not in the log; a CARMEN log has no IMU")
     if (options.sonar_topics or options.sonar_ring is not None) and not options.without_sonar:
         raise UsageError("a CARMEN log holds no sonar", "--sonar names a second file that does")
+    if options.points_topics:
+        raise UsageError("a CARMEN log holds no 3D points", "leave out --points-topic")
     return CarmenRecording(pieces, survey(pieces, options), options)
 
 
@@ -43,6 +46,11 @@ class CarmenRecording(Recording):
         self._found = found
         self._options = options
         self._start, self._stop = start, stop
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read."""
+        return self._found.damage
 
     def _stream(self) -> Iterator[Record]:
         reader = NumberReader()
@@ -68,7 +76,7 @@ class CarmenRecording(Recording):
     def _lines(self) -> Iterator[tuple[str, bytes]]:
         used = {self._found.laser, self._found.odometry}
         for piece in self._pieces:
-            for tag, line in carmen_lines(piece):
+            for tag, line in carmen_lines(TextLog(piece)):
                 if tag in used and tag:
                     yield tag, line
 

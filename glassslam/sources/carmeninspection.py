@@ -18,6 +18,7 @@ from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
 from glassslam.sources.observers import OdometryObserver, ScanObserver, gather
 from glassslam.sources.report import Plan, RecordingReport, TopicReport
+from glassslam.sources.textlines import TextLog, text_damage
 
 
 class _CarmenInspection:
@@ -58,11 +59,12 @@ def inspect_carmen(pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...
     NoScansError
         No line could be read.
     RecordingError
-        A file is damaged.
+        A file cannot be read.
     """
     seen = _CarmenInspection()
-    for piece in pieces:
-        for tag, line in carmen_lines(piece):
+    logs = [TextLog(piece) for piece in pieces]
+    for log in logs:
+        for tag, line in carmen_lines(log):
             if tag:
                 seen.add(tag, line)
     if seen.first > seen.last:
@@ -86,6 +88,7 @@ def inspect_carmen(pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...
         plan=plan,
         dropped=seen.dropped,
         warnings=warnings,
+        damage=text_damage(logs, sum(seen.counts.values()), seen.first, seen.last),
     )
 
 

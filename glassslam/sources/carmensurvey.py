@@ -9,6 +9,7 @@ import numpy as np
 
 from glassslam.errors import NoScansError, UsageError
 from glassslam.geometry import between, wrap_angle
+from glassslam.records import Damage
 from glassslam.sources.bag import Topic
 from glassslam.sources.carmenlines import (
     FLASER,
@@ -24,7 +25,7 @@ from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
 from glassslam.sources.noecho import NoEcho, detect_no_echo
 from glassslam.sources.options import UNUSED, SourceOptions
-from glassslam.sources.textlines import text_lines
+from glassslam.sources.textlines import TextLog, text_damage
 from glassslam.sources.topics import pick_topic
 
 _T = TypeVar("_T")
@@ -37,15 +38,15 @@ _SAMPLES = 256
 _RIGID = 1e-3
 
 
-def carmen_lines(piece: Piece) -> Iterator[tuple[str, bytes]]:
+def carmen_lines(log: TextLog) -> Iterator[tuple[str, bytes]]:
     """Tag and text of the lines that carry sensor data, in file order; other lines have an empty tag.
 
     Raises
     ------
     RecordingError
-        The file cannot be read or unpacked to its end.
+        The file cannot be read; or is damaged, and that is not accepted.
     """
-    for line in text_lines(piece):
+    for line in log.lines():
         for tag, prefix in _PREFIXES.items():
             if line.startswith(prefix):
                 yield tag, line
@@ -96,6 +97,8 @@ class CarmenSurvey:
         First and last record time, s.
     warnings : tuple of str
         What a user should know.
+    damage : tuple of Damage
+        What could not be read.
     """
 
     counts: dict[str, int]
@@ -107,6 +110,7 @@ class CarmenSurvey:
     begin: float
     end: float
     warnings: tuple[str, ...]
+    damage: tuple[Damage, ...] = ()
 
     def record_time(self, stamp: float, logged: float) -> float:
         """When a line was written, s; its stamp where the logger kept no time."""
@@ -124,13 +128,14 @@ def survey(pieces: Sequence[Piece], options: SourceOptions) -> CarmenSurvey:
     """
     samples = {tag: TagSamples() for tag in TAGS}
     offset = 0.0
-    for piece in pieces:
-        for tag, line in carmen_lines(piece):
+    logs = [TextLog(piece, strict=options.strict) for piece in pieces]
+    for log in logs:
+        for tag, line in carmen_lines(log):
             if tag:
                 samples[tag].add(line)
             elif line.startswith(_LASER_OFFSET):
                 offset = _number(line[len(_LASER_OFFSET) :])
-    return _Surveyor(pieces, options, samples, offset).run()
+    return _Surveyor(logs, options, samples, offset).run()
 
 
 def _number(text: bytes) -> float:
@@ -145,9 +150,9 @@ class _Surveyor:
     """The steps of `survey` after reading, in which warnings gather."""
 
     def __init__(
-        self, pieces: Sequence[Piece], options: SourceOptions, samples: dict[str, TagSamples], offset: float
+        self, logs: Sequence[TextLog], options: SourceOptions, samples: dict[str, TagSamples], offset: float
     ) -> None:
-        self._pieces = pieces
+        self._logs = logs
         self._options = options
         self._samples = samples
         self._offset = offset
@@ -164,10 +169,14 @@ class _Surveyor:
         laser = pick_topic("scan", topics, kinds, wish, seconds)
         lines = self._lasers(laser.name) if laser else []
         if laser is None or not lines:
-            raise NoScansError(f"no usable FLASER or ROBOTLASER1 line in {self._pieces[0].path}")
+            raise NoScansError(
+                f"no usable FLASER or ROBOTLASER1 line in {self._logs[0].piece.path}",
+                "".join(gap.reason for log in self._logs for gap in log.gaps[:1]),
+            )
         times = times or [(line.stamp, line.logged) for line in lines]  # neither end can be read
         clock = self._clock_offset(times)
         record_times = [stamp if math.isnan(logged + clock) else logged + clock for stamp, logged in times]
+        begin, end = min(record_times), max(record_times)
         return CarmenSurvey(
             counts={topic.name: topic.count for topic in topics},
             laser=laser.name,
@@ -175,9 +184,10 @@ class _Surveyor:
             base_from_laser=self._options.laser_pose or self._base_from_laser(lines),
             no_echo=detect_no_echo(line.ranges for line in lines),
             clock_offset=clock,
-            begin=min(record_times),
-            end=max(record_times),
+            begin=begin,
+            end=end,
             warnings=tuple(self._warnings),
+            damage=text_damage(self._logs, sum(s.count for s in self._samples.values()), begin, end),
         )
 
     def _outer_times(self, tag: str) -> list[tuple[float, float]]:
@@ -205,7 +215,7 @@ class _Surveyor:
     def _clock_offset(self, times: Sequence[tuple[float, float]]) -> float:
         """From the logger's clock to that of the stamps; NaN when the logger's clock stands or restarts."""
         logged = [time for _, time in times]
-        if len(self._pieces) > 1 or not all(map(math.isfinite, logged)) or max(logged) <= min(logged):
+        if len(self._logs) > 1 or not all(map(math.isfinite, logged)) or max(logged) <= min(logged):
             return math.nan
         first = min(times, key=lambda pair: pair[1])
         return first[0] - first[1]

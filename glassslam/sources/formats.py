@@ -3,6 +3,7 @@
 import re
 import zlib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -36,16 +37,29 @@ _PLAYER_LINE = re.compile(
     re.MULTILINE,
 )
 # Index, counter, counter, ticks of 100 ns since the year 1, then readings.
-_PIMAP_LINE = re.compile(rb"\d+ \d+ \d+ 6\d{17}(?: -?[\d.]+){3,}\s*$", re.MULTILINE)
+_PIMAP_LINE = re.compile(rb"^\d+ \d+ \d+ 6\d{17}(?: -?[\d.]+){3,}\s*$", re.MULTILINE)
 _HEAD_BYTES = 1 << 16
+# Fed in small steps: a decompressor that meets damage returns nothing of that step.
+_STEP_BYTES = 256
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One file (or ROS2 directory with metadata) of a recording and its format."""
+    """One file (or ROS2 directory with metadata) of a recording.
+
+    Attributes
+    ----------
+    path : Path
+        Where it is.
+    format : str
+        What it is.
+    size : int or None
+        Bytes of the file when it was opened; None for a directory.
+    """
 
     path: Path
     format: Format
+    size: int | None = None
 
 
 def resolve(paths: Sequence[str | Path]) -> tuple[Piece, ...]:
@@ -73,7 +87,7 @@ def _expand(path: Path) -> tuple[Piece, ...]:
         if not path.exists():
             raise RecordingError(f"{path} does not exist")
         if not path.is_dir():
-            return (Piece(path, _detect(path)),)
+            return (_file(path),)
         files = sorted((p for p in path.iterdir() if p.suffix in {".mcap", ".db3"}), key=natural_order)
         if (path / "metadata.yaml").exists():
             return (Piece(path, _directory_format(path, files)),)
@@ -81,7 +95,11 @@ def _expand(path: Path) -> tuple[Piece, ...]:
             raise RecordingError(
                 f"{path} is a directory without a ROS2 bag in it", "name the files themselves"
             )
-        return tuple(Piece(file, _detect(file)) for file in files)
+        return tuple(map(_file, files))
+
+
+def _file(path: Path) -> Piece:
+    return Piece(path, _detect(path), path.stat().st_size)
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:
@@ -111,19 +129,28 @@ def _detect(path: Path) -> Format:
         if head.startswith(magic):
             raise RecordingError(f"{path} is {what}", hint)
     text = _inflate(head) if head.startswith(GZIP_MAGIC) else head
-    if b"\x00" not in text:
+    if _is_text(text):
         if _CARMEN_LINE.search(text):
             return "carmen"
         if _PLAYER_LINE.search(text):
             return "player"
-        if _PIMAP_LINE.match(text):
+        if _PIMAP_LINE.search(text):
             return "pimap"
     raise RecordingError(f"{path} is no recording known here", KNOWN)
 
 
+def _is_text(head: bytes) -> bool:
+    """Whether there is next to no zero byte; a power cut leaves many of them at the end of a log."""
+    text = head.rstrip(b"\x00")
+    return text.count(b"\x00") * 1000 <= len(text)
+
+
 def _inflate(head: bytes) -> bytes:
-    """What the beginning of a gzip file unpacks to; nothing where it is broken."""
-    try:
-        return zlib.decompressobj(wbits=31).decompress(head, 4 * _HEAD_BYTES)
-    except zlib.error:
-        return b""
+    """What the beginning of a gzip file unpacks to, up to its first damage."""
+    inflate, text = zlib.decompressobj(wbits=31), bytearray()
+    with suppress(zlib.error):
+        for k in range(0, len(head), _STEP_BYTES):
+            text += inflate.decompress(head[k : k + _STEP_BYTES], _HEAD_BYTES)
+            if inflate.unconsumed_tail or len(text) > 4 * _HEAD_BYTES:
+                break
+    return bytes(text)

@@ -15,6 +15,7 @@ from glassslam.sources.report import Plan, RecordingReport
 from glassslam.sources.sonarfile import SonarFile, open_sonar
 from glassslam.sources.sonarobserver import SonarObserver
 from glassslam.sources.sonarreport import SonarReport
+from glassslam.sources.sweeps import SweepRule
 
 
 def inspect_recording(
@@ -55,7 +56,7 @@ def _report(
     if pieces[0].format == "pimap":
         from glassslam.sources.pimapinspection import inspect_pimap  # noqa: PLC0415
 
-        return inspect_pimap(pieces, plan)
+        return inspect_pimap(pieces, plan, strict=strict)
     if pieces[0].format == "carmen":
         from glassslam.sources.carmeninspection import inspect_carmen  # noqa: PLC0415  (loads kernels)
 
@@ -83,6 +84,8 @@ def _plan(pieces: Sequence[Piece], options: SourceOptions) -> tuple[Recording | 
         base_from_laser=info.base_from_laser,
         sonar_topics=info.sonar_topics,
         sonar_ring=ring_title(info.sonar_ring),
+        points_topics=info.points_topics,
+        laser_height=info.laser_height,
     )
     return recording, plan
 
@@ -98,7 +101,7 @@ def _of_recording(recording: Recording) -> tuple[SonarReport, ...]:
     if not info.sonar_topics:
         return ()
     rule = recording.sonar_rule
-    observers = [SonarObserver(info.sonar_topics, ring, rule) for ring in _kinds(info.sonar_ring)]
+    observers = _observers(info.sonar_topics, info.points_topics, info.sonar_ring, rule)
     with suppress(NoScansError):
         _observe(observers, recording.records())
     return gather(observer.report() for observer in observers)
@@ -124,14 +127,20 @@ def _of_files(
 
 
 def _of_file(file: SonarFile) -> tuple[SonarReport, ...]:
-    observers = [SonarObserver(file.topics, ring, file.rule) for ring in _kinds(file.ring)]
+    observers = _observers(file.topics, file.points_topics, file.ring, file.rule)
     _observe(observers, file.records(lambda _: None))
     return gather(observer.report() for observer in observers)
 
 
-def _kinds(ring: SonarRing | None) -> tuple[SonarRing | None, ...]:
+def _observers(
+    topics: Sequence[str], points: Sequence[str], ring: SonarRing | None, rule: SweepRule | None
+) -> list[SonarObserver]:
     """One observer for the ring, one for 3D sensors."""
-    return (None,) if ring is None else (ring, None)
+    of_points = SonarObserver(points, None, rule)
+    if ring is None:
+        return [of_points]
+    swept = [topic for topic in topics if topic not in points]
+    return [SonarObserver(swept, ring, rule), of_points]
 
 
 def _observe(observers: Sequence[SonarObserver], records: Iterable[Record]) -> None:

@@ -36,6 +36,9 @@ class SourceOptions:
         A second file, which holds the sonar readings: a bag, a Player log or a pi-map text log.
     sonar_topic : str, tuple of str or None
         Topics of the sonars by name; None: what looks like sonar. "none" switches sonar off.
+    points_topic : str, tuple of str or None
+        Topics of 3D ultrasonic sensors by name; None: those of the sonar topics that turn out to be points.
+        "none" leaves points out.
     sonar_ring : str, Path or None
         Where the sonars sit: the name of a shipped ring or a YAML file; None: as recorded.
     strict : bool
@@ -58,6 +61,7 @@ class SourceOptions:
     sonar: str | Path | None = None
     sonar_topic: str | tuple[str, ...] | None = None
     sonar_ring: str | Path | None = None
+    points_topic: str | tuple[str, ...] | None = None
     strict: bool = False
 
     def __post_init__(self) -> None:
@@ -79,13 +83,26 @@ class SourceOptions:
     @property
     def sonar_topics(self) -> tuple[str, ...]:
         """The topics of `sonar_topic`, however they were given."""
-        wish = self.sonar_topic
-        return () if wish is None else (wish,) if isinstance(wish, str) else tuple(wish)
+        return _several(self.sonar_topic)
 
     @property
     def without_sonar(self) -> bool:
         """Whether sonar is switched off."""
         return UNUSED in self.sonar_topics
+
+    @property
+    def points_topics(self) -> tuple[str, ...]:
+        """The topics named in `points_topic`, however they were given; none where points are left out."""
+        return () if self.without_points else _several(self.points_topic)
+
+    @property
+    def without_points(self) -> bool:
+        """Whether points of 3D sensors are left out."""
+        return UNUSED in _several(self.points_topic)
+
+
+def _several(wish: str | tuple[str, ...] | None) -> tuple[str, ...]:
+    return () if wish is None else (wish,) if isinstance(wish, str) else tuple(wish)
 
 
 def _is_pose(values: tuple[float, ...]) -> bool:

@@ -2,22 +2,29 @@
 
 from collections.abc import Sequence
 
+from glassslam.records import Damage
+from glassslam.sources.carmenlines import UNREADABLE_LINE
 from glassslam.sources.formats import Piece
-from glassslam.sources.pimap import POSE_VALUES, read_pimap_sonar
+from glassslam.sources.pimap import POSE_VALUES, read_pimap
 from glassslam.sources.report import Plan, RecordingReport, TopicReport
 
 
-def inspect_pimap(pieces: Sequence[Piece], plan: Plan) -> RecordingReport:
+def inspect_pimap(pieces: Sequence[Piece], plan: Plan, *, strict: bool = False) -> RecordingReport:
     """Read logs and report what they hold.
 
     Raises
     ------
     RecordingError
-        A file is damaged.
+        A file cannot be read; or is damaged, and `strict` was said.
     """
     topics, begin, end = [], float("inf"), float("-inf")
+    damage: list[Damage] = []
+    dropped = 0
     for piece in pieces:
-        times, values = read_pimap_sonar(piece.path)
+        log = read_pimap(piece.path, strict=strict)
+        times, values = log.sweep_times, log.values
+        damage += log.damage
+        dropped += log.dropped
         begin, end = min(begin, float(times[0])), max(end, float(times[-1]))
         length = float(times[-1] - times[0])
         kind = "pi-map poses" if values.shape[1] == POSE_VALUES else "pi-map ranges"
@@ -35,6 +42,7 @@ def inspect_pimap(pieces: Sequence[Piece], plan: Plan) -> RecordingReport:
         imus=(),
         transforms=(),
         plan=plan,
-        dropped={},
+        dropped={UNREADABLE_LINE: dropped} if dropped else {},
         warnings=(),
+        damage=tuple(damage),
     )

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 from glassslam.errors import UsageError
-from glassslam.records import LaserScan, Odometry, RangeRing, Record, RecordingInfo
+from glassslam.records import Damage, LaserScan, Odometry, RangeRing, Record, RecordingInfo
 from glassslam.sources.carmenlines import NumberReader
 from glassslam.sources.formats import Piece
 from glassslam.sources.messages import BAD_ODOMETRY, UnusableMessageError, upper_limit
@@ -16,6 +16,7 @@ from glassslam.sources.playervalues import Pose, parse_pose, parse_ranges, parse
 from glassslam.sources.recording import Recording
 from glassslam.sources.sonarfeed import OTHER_SIZE
 from glassslam.sources.sweeps import SweepFilter
+from glassslam.sources.textlines import TextLog
 
 
 def open_player(pieces: Sequence[Piece], options: SourceOptions) -> "PlayerRecording":
@@ -40,6 +41,11 @@ class PlayerRecording(Recording):
         self._pieces = pieces
         self._found = found
         self._options = options
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read."""
+        return self._found.damage
 
     def _stream(self) -> Iterator[Record]:
         reader, ring = NumberReader(), RingReader(self._found.sonar)
@@ -120,7 +126,7 @@ def _used_lines(
 ) -> Iterator[PlayerLine]:
     used = {found.laser, found.odometry, found.sonar.device}
     for piece in pieces:
-        for line in player_lines(piece):
+        for line in player_lines(TextLog(piece)):
             if isinstance(line, str):
                 drop(line)
             elif line is not None and line.device in used and line.kind not in DESCRIPTIONS:

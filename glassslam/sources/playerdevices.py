@@ -9,7 +9,6 @@ import numpy as np
 from glassslam.geometry import compose
 from glassslam.records import Float32Array, FloatArray
 from glassslam.sources.carmenlines import NumberReader
-from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
 from glassslam.sources.playerlines import PlayerLine, split_line
 from glassslam.sources.playervalues import (
@@ -23,7 +22,7 @@ from glassslam.sources.playervalues import (
     parse_sonar,
     scan_of_ranger,
 )
-from glassslam.sources.textlines import text_lines
+from glassslam.sources.textlines import TextLog
 
 _SAMPLES = 256
 _SWEEPS = 4000
@@ -31,15 +30,15 @@ _SWEEPS = 4000
 _LASER_BEAMS = 40
 
 
-def player_lines(piece: Piece) -> Iterator[PlayerLine | str | None]:
+def player_lines(log: TextLog) -> Iterator[PlayerLine | str | None]:
     """Lines in file order: read so far, None for those without use, or why they cannot be read.
 
     Raises
     ------
     RecordingError
-        The file cannot be read or unpacked to its end.
+        The file cannot be read; or is damaged, and that is not accepted.
     """
-    for line in text_lines(piece):
+    for line in log.lines():
         try:
             yield split_line(line)
         except UnusableMessageError as error:

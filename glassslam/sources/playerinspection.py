@@ -14,6 +14,7 @@ from glassslam.sources.playerlines import PlayerLine
 from glassslam.sources.playersurvey import gather_devices
 from glassslam.sources.playervalues import Pose, parse_pose
 from glassslam.sources.report import Plan, RecordingReport, TopicReport
+from glassslam.sources.textlines import TextLog
 
 
 class _PlayerInspection:
@@ -77,14 +78,14 @@ def inspect_player(pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...
     NoScansError
         No line could be read.
     RecordingError
-        A file is damaged.
+        A file cannot be read.
     """
-    devices = gather_devices(pieces)
+    devices, damage = gather_devices(pieces)
     if math.isinf(devices.first):
         raise NoScansError(f"no usable line in {pieces[0].path}", plan.problem)
     seen = _PlayerInspection(devices)
     for piece in pieces:
-        for line in player_lines(piece):
+        for line in player_lines(TextLog(piece)):
             seen.add(line)
     seconds = devices.last - devices.first
     return RecordingReport(
@@ -104,4 +105,5 @@ def inspect_player(pieces: Sequence[Piece], plan: Plan, warnings: tuple[str, ...
         plan=plan,
         dropped=seen.dropped,
         warnings=warnings,
+        damage=damage,
     )

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from glassslam.errors import RecordingError
-from glassslam.records import RangeRing
+from glassslam.records import Damage, RangeRing
 from glassslam.sources.carmenlines import NumberReader
 from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
@@ -12,6 +12,7 @@ from glassslam.sources.player import RingReader
 from glassslam.sources.playerdevices import player_lines
 from glassslam.sources.playersurvey import choose_sonar, gather_devices
 from glassslam.sources.sonarfile import Drop, SonarFile
+from glassslam.sources.textlines import TextLog
 
 
 class PlayerSonarFile(SonarFile):
@@ -26,7 +27,7 @@ class PlayerSonarFile(SonarFile):
     """
 
     def __init__(self, piece: Piece, options: SourceOptions) -> None:
-        devices = gather_devices([piece])
+        devices, self._damage = gather_devices([piece], strict=options.strict)
         self._sonar = choose_sonar(devices, options, max(0.0, devices.last - devices.first))
         if not self._sonar.device:
             raise RecordingError(f"no sonar in {piece.path}", "name a log with sonar or ranger lines")
@@ -34,11 +35,19 @@ class PlayerSonarFile(SonarFile):
         self.path, self.ring, self.topics = piece.path, self._sonar.ring, (self._sonar.device,)
         self.rule, self.span = self._sonar.rule, (devices.first, devices.last)
 
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read."""
+        return self._damage
+
     def records(self, drop: Drop) -> Iterator[RangeRing]:
         """Sweeps in the order of the file."""
         reader, ring = NumberReader(), RingReader(self._sonar)
-        for line in player_lines(self._piece):
-            if line is None or isinstance(line, str) or line.device != self._sonar.device:
+        for line in player_lines(TextLog(self._piece)):
+            if isinstance(line, str):
+                drop(line)
+                continue
+            if line is None or line.device != self._sonar.device:
                 continue
             try:
                 yield from ring.read(line, reader)

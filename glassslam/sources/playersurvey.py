@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glassslam.errors import NoScansError, UsageError
-from glassslam.records import SonarRing
+from glassslam.records import Damage, SonarRing
 from glassslam.sources.bag import Topic
 from glassslam.sources.formats import Piece
 from glassslam.sources.noecho import NoEcho, detect_no_echo
@@ -16,6 +16,7 @@ from glassslam.sources.playervalues import Pose
 from glassslam.sources.ringgeometry import USUAL_FIELD_OF_VIEW
 from glassslam.sources.rings import load_ring
 from glassslam.sources.sweeps import Series, SweepRule, no_echo_of, sweep_rule
+from glassslam.sources.textlines import TextLog, text_damage
 from glassslam.sources.topics import describe, pick_topic
 
 RING_HINT = "--sonar-ring NAME or FILE says where the sonars sit"
@@ -48,6 +49,8 @@ class PlayerSurvey:
         The ring.
     warnings : tuple of str
         What a user should know.
+    damage : tuple of Damage
+        What could not be read.
     """
 
     devices: PlayerDevices
@@ -57,22 +60,26 @@ class PlayerSurvey:
     no_echo: NoEcho
     sonar: PlayerSonar
     warnings: tuple[str, ...]
+    damage: tuple[Damage, ...] = ()
 
 
-def gather_devices(pieces: Sequence[Piece]) -> PlayerDevices:
-    """Read logs that are pieces of one recording once, quickly.
+def gather_devices(
+    pieces: Sequence[Piece], *, strict: bool = False
+) -> tuple[PlayerDevices, tuple[Damage, ...]]:
+    """Read logs that are pieces of one recording once, quickly; and what of them cannot be read.
 
     Raises
     ------
     RecordingError
-        A file is damaged.
+        A file cannot be read; or is damaged, and `strict` was said.
     """
     devices = PlayerDevices()
-    for piece in pieces:
-        for line in player_lines(piece):
+    logs = [TextLog(piece, strict=strict) for piece in pieces]
+    for log in logs:
+        for line in player_lines(log):
             if line is not None and not isinstance(line, str):
                 devices.add(line)
-    return devices
+    return devices, text_damage(logs, devices.counts.total(), devices.first, devices.last)
 
 
 def survey_player(pieces: Sequence[Piece], options: SourceOptions) -> PlayerSurvey:
@@ -83,7 +90,7 @@ def survey_player(pieces: Sequence[Piece], options: SourceOptions) -> PlayerSurv
     NoScansError, UsageError, RecordingError
         As in `open_recording`.
     """
-    devices = gather_devices(pieces)
+    devices, damage = gather_devices(pieces, strict=options.strict)
     seconds = max(0.0, devices.last - devices.first)
     lasers = _topics(devices, devices.scans)
     laser = pick_topic("scan", lasers, ["Player laser", "Player ranger"], options.scan_topic, seconds)
@@ -98,6 +105,7 @@ def survey_player(pieces: Sequence[Piece], options: SourceOptions) -> PlayerSurv
         no_echo=detect_no_echo(scan.ranges for scan in devices.scans[laser.name]),
         sonar=sonar,
         warnings=(warning,) if warning else (),
+        damage=damage,
     )
 
 
@@ -132,7 +140,7 @@ def _sonar_or_warning(
     try:
         return choose_sonar(devices, options, seconds), ""
     except UsageError as error:
-        if options.sonar_topics or options.sonar_ring is not None:
+        if options.sonar_topics or options.points_topics or options.sonar_ring is not None:
             raise
         hint = f" ({error.hint})" if error.hint else ""
         return PlayerSonar(), f"sonar is not used: {error.message}{hint}"
@@ -146,6 +154,8 @@ def choose_sonar(devices: PlayerDevices, options: SourceOptions, seconds: float)
     UsageError
         There are several, none where one is wished for, or the ring has another number of sonars.
     """
+    if options.points_topics:
+        raise UsageError("a Player log holds no 3D points", "leave out --points-topic")
     if options.without_sonar:
         return PlayerSonar()
     topics = _topics(devices, devices.sweeps)

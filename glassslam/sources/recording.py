@@ -116,7 +116,7 @@ def open_recording(
     from glassslam.sources.sonarfile import with_sonar  # noqa: PLC0415  (it builds on this module)
 
     # What the user says of sonar is then said of the second file.
-    alone = replace(chosen, sonar=None, sonar_topic=UNUSED, sonar_ring=None)
+    alone = replace(chosen, sonar=None, sonar_topic=UNUSED, sonar_ring=None, points_topic=None)
     return with_sonar(_open(pieces, alone), chosen)
 
 

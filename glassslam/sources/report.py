@@ -135,6 +135,8 @@ class Plan:
     base_from_laser: Pose2 = (0.0, 0.0, 0.0)
     sonar_topics: tuple[str, ...] = ()
     sonar_ring: str = ""
+    points_topics: tuple[str, ...] = ()
+    laser_height: float | None = None
     problem: str = ""
     hint: str = ""
 

@@ -125,14 +125,14 @@ def _storage(piece: Piece, *, strict: bool) -> Storage:
         with reading(piece.path, piece.format):
             directory = Directory(piece.path, strict=strict)
             directory.open()
-            damaged = bool(directory.damage)
+            damaged = bool(directory.damage) or directory.holds_more
             packed = directory.metadata.compression_mode == "message"
             directory.close()
     except RecordingError as error:
         if strict or not directory_files(piece):
             raise
         return Files(directory_files(piece), piece.format, [metadata_damage(piece, error)])
-    # Counts and times of the metadata hold no longer; and packed messages are unpacked within bounds there.
+    # What metadata count may hold no longer; and packed messages are unpacked within bounds there.
     return Files(directory_files(piece), piece.format, ()) if damaged or packed else directory
 
 

@@ -60,6 +60,11 @@ class Directory(DirectoryReader):
         """What could not be read so far."""
         return tuple(part for storage in self._opened.values() for part in storage.damage)
 
+    @property
+    def holds_more(self) -> bool:
+        """Whether a recorder has left something beside a file, of which the metadata may not know."""
+        return any(isinstance(s, SqliteStorage) and s.is_scanned for s in self._opened.values())
+
     def _plugin(self, format_name: str) -> Callable[[Path], FileStorage]:
         def storage_of(path: Path) -> FileStorage:
             if path not in self._opened:

@@ -68,6 +68,11 @@ class SonarPlan:
         """Names of all topics in use."""
         return tuple(topic.name for topic in (*self.ring_topics, *self.point_topics))
 
+    @property
+    def points_names(self) -> tuple[str, ...]:
+        """Names of the topics of 3D sensors."""
+        return tuple(topic.name for topic in self.point_topics)
+
     def uses(self, topic: Topic) -> bool:
         """Whether messages of a topic are read."""
         used = (*self.ring_topics, *self.point_topics)
@@ -156,8 +161,9 @@ class SonarFeed:
     def _points(self, topic: Topic, message: Any, record_ns: int) -> Sequence[SonarRecord]:
         points = POINTS_OF[topic.msgtype](message)
         points = self._in_base(topic, points[np.all(np.isfinite(points), axis=1)])
-        origin = self._plan.base_from_frame[topic.name][:3, 3].copy()
-        return (PointSet(stamp_of(message.header, record_ns), points, origin, record_ns / 1e9),)
+        matrix = self._plan.base_from_frame[topic.name]
+        origin, (x, y, z) = matrix[:3, 3].copy(), matrix[:3, 0].tolist()
+        return (PointSet(stamp_of(message.header, record_ns), points, origin, record_ns / 1e9, (x, y, z)),)
 
     def _in_base(self, topic: Topic, points: Float32Array) -> Float32Array:
         matrix = self._plan.base_from_frame[topic.name]

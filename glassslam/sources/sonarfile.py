@@ -30,6 +30,8 @@ class SonarFile(ABC):
         Where the sonars of the ring sit; None when the file holds points of a 3D sensor only.
     topics : tuple of str
         What is read.
+    points_topics : tuple of str
+        Those of 3D sensors among them.
     span : tuple of float
         Record times of the first and the last reading, s.
     rule : SweepRule or None
@@ -42,6 +44,7 @@ class SonarFile(ABC):
     ring: SonarRing | None
     topics: tuple[str, ...]
     span: tuple[float, float]
+    points_topics: tuple[str, ...] = ()
     rule: SweepRule | None = None
     warnings: tuple[str, ...] = ()
 
@@ -130,7 +133,9 @@ class MergedRecording(Recording):
     """
 
     def __init__(self, inner: Recording, sonar: SonarFile) -> None:
-        info = replace(inner.info, sonar_ring=sonar.ring, sonar_topics=sonar.topics)
+        info = replace(
+            inner.info, sonar_ring=sonar.ring, sonar_topics=sonar.topics, points_topics=sonar.points_topics
+        )
         super().__init__(info, (*inner.warnings, *sonar.warnings), inner.span, sonar.rule)
         inner.warnings, inner.dropped = self.warnings, self.dropped
         self._inner, self._sonar = inner, sonar

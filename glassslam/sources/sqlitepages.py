@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
+from glassslam.sources.sqlitelogs import Overlay, read_overlay
 from glassslam.sources.windows import BrokenRecordError
 
 Value: TypeAlias = "int | bytes | str | float | None"
@@ -24,6 +25,36 @@ def announced_size(path: Path) -> int:
     with path.open("rb") as file:
         header = file.read(HEADER_BYTES)
     return int.from_bytes(header[28:32], "big") * _page_size(header)
+
+
+def change_counter(path: Path) -> bytes:
+    """The bytes of the header that every transaction changes."""
+    with path.open("rb") as file:
+        return file.read(HEADER_BYTES)[24:32]
+
+
+def overlay_of(path: Path, *, even_empty: bool = False) -> Overlay | None:
+    """The pages a recorder has left beside a database; None where the file holds all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    even_empty : bool
+        Whether to give an overlay without pages, rather than None.
+
+    Raises
+    ------
+    BrokenRecordError
+        Not even the size of a page can be told.
+    """
+    with path.open("rb") as file:
+        pages = PageFile(path, file)
+        found = read_overlay(path, pages.page_size, pages.count)
+        if found is None and even_empty:
+            found = Overlay(path, pages.page_size)
+            found.commit(pages.count)
+        return found
 
 
 def _page_size(header: bytes) -> int:
@@ -51,25 +82,35 @@ class PageFile:
         Not even the size of a page can be told.
     """
 
-    def __init__(self, path: Path, file: BinaryIO) -> None:
+    def __init__(self, path: Path, file: BinaryIO, overlay: Overlay | None = None) -> None:
         header = file.read(HEADER_BYTES)
         self.page_size = _page_size(header)
         if len(header) < HEADER_BYTES or self.page_size < 512 or self.page_size & (self.page_size - 1):
             raise BrokenRecordError("a header that tells no size of pages")
         self._usable = self.page_size - header[20]
         self._file = file
-        self.count = path.stat().st_size // self.page_size
+        self._overlay = overlay
+        self._held = path.stat().st_size // self.page_size
+        self.count = self._held if overlay is None else overlay.count
 
     def page(self, number: int) -> bytes:
         """One page; the first has number 1."""
-        if not 0 < number <= self.count:
+        if self._overlay is not None and number in self._overlay:
+            return self._overlay.page(number)
+        if not 0 < number <= min(self.count, self._held):
             raise BrokenRecordError("a page that the file does not hold")
         self._file.seek((number - 1) * self.page_size)
         return self._file.read(self.page_size)
 
+    def holds(self, number: int) -> bool:
+        """Whether the page of this number can be read."""
+        return 0 < number <= self._held or (self._overlay is not None and number in self._overlay)
+
     def leaves(self) -> Iterator[int]:
         """Numbers of the pages that look like leaves of a table."""
         for number in range(1, self.count + 1):
+            if not self.holds(number):
+                continue
             page = self.page(number)
             if page[HEADER_BYTES if number == 1 else 0] == _LEAF:
                 yield number

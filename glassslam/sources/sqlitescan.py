@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinition, MessageDefinitionFormat
 
 from glassslam.records import Damage
+from glassslam.sources.sqlitelogs import NO_LOG, Overlay
 from glassslam.sources.sqlitepages import Cell, PageFile, announced_size, serial_types, values
 from glassslam.sources.windows import BrokenRecordError
 
@@ -37,8 +38,15 @@ class SqliteIndex:
     damage: list[Damage] = field(default_factory=list)
 
 
-def scan_sqlite(path: Path) -> SqliteIndex:
+def scan_sqlite(path: Path, overlay: Overlay | None = None) -> SqliteIndex:
     """Find every message of a database, as far as the file reaches at this moment.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    overlay : Overlay, optional
+        What a recorder has left beside it.
 
     Raises
     ------
@@ -46,22 +54,25 @@ def scan_sqlite(path: Path) -> SqliteIndex:
         Nothing can be told of it.
     """
     with path.open("rb") as file:
-        pages = PageFile(path, file)
+        pages = PageFile(path, file, overlay)
         tables = dict(_tables(pages))
         definitions = dict(_definitions(pages, tables.get("message_definitions", 0)))
         connections = list(_connections(pages, tables.get("topics", 0), definitions))
         rows = _messages(pages, {connection.id for connection in connections})
     counted = [c._replace(msgcount=int((rows[:, 2] == c.id).sum())) for c in connections]
-    return SqliteIndex(counted, rows, _damage(path, pages.page_size, rows))
+    if overlay is None:
+        return SqliteIndex(counted, rows, _damage(path, pages.page_size, rows))
+    return SqliteIndex(counted, rows, _damage_below(path, pages, overlay, rows))
 
 
 def message_of(pages: PageFile, row: NDArray[np.int64]) -> bytes:
     """The serialised message of a row."""
-    _, rowid, _, page, offset, length = row.tolist()
-    data = values(pages.record(Cell(rowid, page, offset, length)))[3]
-    if not isinstance(data, bytes):
+    time, rowid, topic, page, offset, length = row.tolist()
+    columns = values(pages.record(Cell(rowid, page, offset, length)))
+    # Where a recorder still writes, something else may stand in that place by now.
+    if len(columns) != 4 or columns[1:3] != [topic, time] or not isinstance(columns[3], bytes):
         raise BrokenRecordError("a message that is none")
-    return data
+    return columns[3]
 
 
 def _tables(pages: PageFile) -> Iterator[tuple[str, int]]:
@@ -136,6 +147,23 @@ def _damage(path: Path, page_size: int, rows: NDArray[np.int64]) -> list[Damage]
         reason = f"the file is cut off here, {missing} bytes are missing"
         found.append(Damage(str(path), size, 0, last, None if last is None else last + seconds, lost, reason))
     return found or [Damage(str(path), 0, 0, None, None, 0, "the database is malformed")]
+
+
+def _damage_below(path: Path, pages: PageFile, overlay: Overlay, rows: NDArray[np.int64]) -> list[Damage]:
+    """Pages that neither the file nor its log holds, rows that are left out, and what of the log is lost."""
+    found = [*_left_out(path, pages.page_size, rows)]
+    per_byte = len(rows) / max(1, pages.count * pages.page_size)
+    last = float(rows[-1, 0]) / 1e9 if len(rows) else None
+    missing = sum(not pages.holds(number) for number in range(1, pages.count + 1)) * pages.page_size
+    if missing:
+        reason = f"{missing} bytes of the database are missing"
+        lost = round(missing * per_byte)
+        found.append(Damage(str(path), path.stat().st_size, 0, None, None, lost, reason))
+    if overlay.reason:
+        lost = 0 if overlay.reason == NO_LOG else round(overlay.unused * per_byte)
+        place = overlay.offset, overlay.unused, last, last
+        found.append(Damage(str(overlay.path), *place, lost, overlay.reason))
+    return found
 
 
 def _left_out(path: Path, page_size: int, rows: NDArray[np.int64]) -> Iterator[Damage]:

@@ -71,18 +71,11 @@ def write_volume(
         As by `check_folder`; or the volume is empty, or something cannot be written.
     """
     target = check_folder(directory, overwrite=overwrite)
-    writers: tuple[Callable[[Path], Path], ...] = (
-        lambda path: save_volume(tree, path),
-        lambda path: write_octomap(tree, path),
-        lambda path: write_ply(tree, path),
-        lambda path: write_top_view(tree, path, band),
-        lambda path: write_slices(tree, path, band),
-    )
     made = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:
         target.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".volume.", dir=target) as staged:
-            paths = [write(Path(staged) / name) for name, write in zip(VOLUME_FILES, writers, strict=True)]
+            paths = write_files(tree, Path(staged), band)
             paths += also(Path(staged)) if also else []
             return _publish(paths, target)
     except BaseException as error:
@@ -92,6 +85,35 @@ def write_volume(
         if isinstance(error, OSError):
             raise OutputError(f"cannot write {directory}: {error.strerror or error}") from error
         raise
+
+
+def write_files(tree: Octree, folder: Path, band: Band | None = None) -> list[Path]:
+    """Write `VOLUME_FILES` one after the other into a folder that is there.
+
+    Parameters
+    ----------
+    tree : Octree
+        The volume.
+    folder : Path
+        Where the files go.
+    band : tuple of float, optional
+        Heights shown in the pictures, m; all when left out.
+
+    Raises
+    ------
+    OutputError
+        The volume is empty.
+    OSError
+        A file cannot be written.
+    """
+    writers: tuple[Callable[[Path], Path], ...] = (
+        lambda path: save_volume(tree, path),
+        lambda path: write_octomap(tree, path),
+        lambda path: write_ply(tree, path),
+        lambda path: write_top_view(tree, path, band),
+        lambda path: write_slices(tree, path, band),
+    )
+    return [write(folder / name) for name, write in zip(VOLUME_FILES, writers, strict=True)]
 
 
 def _publish(staged: list[Path], target: Path) -> list[Path]:

@@ -2,74 +2,27 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from glassslam.config import SensorConfig
 from glassslam.errors import GridError
 from glassslam.geometry import transform_points
-from glassslam.records import FloatArray, LaserScan, PointSet, Record, Trajectory
+from glassslam.records import Float32Array, FloatArray, LaserScan, PointSet, Record, Trajectory
 from glassslam.slam.range_data import prepare
 from glassslam.slam.scan_check import defect, mended
 from glassslam.volume.evidence import Evidence, joined, observe
-from glassslam.volume.octree import Octree
-from glassslam.volume.odds import Clamp
+from glassslam.volume.octree import CENTRE, Octree
+from glassslam.volume.options import VolumeOptions
 from glassslam.volume.pairing import ApproximateTime
-from glassslam.volume.pooling import Pool, check_pool, pooled
-from glassslam.volume.sensors import LIDAR, ULTRASONIC, InverseModel
+from glassslam.volume.pooling import pooled
+from glassslam.volume.sensors import InverseModel
 from glassslam.volume.track import Track
 
 UNPLACED = "outside of the trajectory"
+TOO_FAR = "too far from the origin of the volume"
 NOT_FINITE = "point that is not finite"
 OUT_OF_FIELD = "point outside of the field of view"
-
-
-@dataclass(frozen=True, slots=True)
-class VolumeOptions:
-    """How a volume is made.
-
-    Attributes
-    ----------
-    resolution : float
-        Edge of a voxel, m.
-    clamp : Clamp
-        Bounds of the voxels.
-    lidar, ultrasonic : InverseModel
-        What the measurements of each say.
-    lidar_height : float
-        Height of the plane of the lidar above the base, m.
-    slop : float
-        Largest difference of the stamps of a pair, s.
-    pool : {"bayes", "iop", "lop", "liop"}
-        How the two measurements of a pair are joined.
-    weights : tuple of float
-        Trust in lidar and ultrasonic sensor, for `lop` and `liop`.
-    ranges : SensorConfig
-        Which ranges of the lidar are believed, and how far silent beams clear.
-
-    Raises
-    ------
-    GridError
-        A value makes no sense.
-    """
-
-    resolution: float = 0.05
-    clamp: Clamp = field(default_factory=Clamp)
-    lidar: InverseModel = LIDAR
-    ultrasonic: InverseModel = ULTRASONIC
-    lidar_height: float = 0.2
-    slop: float = 0.05
-    pool: Pool = "bayes"
-    weights: tuple[float, float] = (1.0, 1.0)
-    ranges: SensorConfig = field(default_factory=SensorConfig)
-
-    def __post_init__(self) -> None:
-        check_pool(self.pool, self.weights)
-        if not (np.isfinite(self.slop) and self.slop >= 0.0):
-            raise GridError(f"messages cannot differ by {self.slop} s", "the slop must be a time from 0 s")
-        if not np.isfinite(self.lidar_height):
-            raise GridError(f"a lidar cannot be {self.lidar_height} m high")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +34,7 @@ class Volume:
     fused : Octree
         Both sensors, joined measurement by measurement.
     lidar, ultrasonic : Octree
-        Each sensor alone.
+        Each sensor alone; empty where this was not asked for.
     counts : dict
         "scans", "point_sets", "points", "pairs" -> how many were used.
     dropped : dict
@@ -147,6 +100,41 @@ class VolumeMapper:
         elif isinstance(record, PointSet):
             self._add_points(record)
 
+    def add_rays(
+        self,
+        stamp: float,
+        pose: FloatArray,
+        sensor: FloatArray,
+        returns: Float32Array | FloatArray,
+        free_ends: Float32Array | FloatArray,
+    ) -> None:
+        """Take a scan whose rays and pose are known already.
+
+        Parameters
+        ----------
+        stamp : float
+            Time of the scan, s.
+        pose : ndarray of float64, shape (3,)
+            Pose of the base in the map frame, m and rad.
+        sensor : ndarray of float64, shape (2,)
+            Position of the lidar in the frame of the base, m.
+        returns, free_ends : ndarray, shape (n, 2), (m, 2)
+            What the beams hit, and ends of free space without echo, frame of the base, m.
+        """
+        height = self._options.lidar_height
+        origin, echoes, silent = (
+            lifted(transform_points(pose, points.astype(np.float64)), height)
+            for points in (sensor[None], returns, free_ends)
+        )
+        said = self._observed(origin[0], echoes, silent, self._options.lidar)
+        if said is None:
+            self._dropped[f"scan {TOO_FAR}"] += 1
+            return
+        if self._options.separate:
+            self._lidar.add_sorted(said.codes, said.log_odds)
+        self._counts["scans"] += 1
+        self._enter(self._pairs.add_first(stamp, said))
+
     def finish(self) -> Volume:
         """Enter what waits for a partner and give out the volume."""
         self._enter(self._pairs.finish())
@@ -161,15 +149,7 @@ class VolumeMapper:
         data = prepare(
             mended(scan), self._base_from_laser, self._track.twist_at(scan.stamp), self._options.ranges
         )
-        height = self._options.lidar_height
-        origin, echoes, silent = (
-            lifted(transform_points(pose, points), height)
-            for points in (data.sensor[None], data.returns, data.free_ends)
-        )
-        said = observe(origin[0], echoes, silent, self._options.lidar, self._options.resolution)
-        self._lidar.add_sorted(said.codes, said.log_odds)
-        self._counts["scans"] += 1
-        self._enter(self._pairs.add_first(scan.stamp, said))
+        self.add_rays(scan.stamp, pose, data.sensor, data.returns, data.free_ends)
 
     def _add_points(self, record: PointSet) -> None:
         pose = self._track.at(record.stamp)
@@ -178,26 +158,38 @@ class VolumeMapper:
             return
         points = self._believed(record)
         origin = placed(pose, record.origin[None].astype(np.float64))[0]
-        said = observe(
-            origin, placed(pose, points), np.empty((0, 3)), self._options.ultrasonic, self._options.resolution
-        )
-        self._ultrasonic.add_sorted(said.codes, said.log_odds)
+        said = self._observed(origin, placed(pose, points), np.empty((0, 3)), self._options.ultrasonic)
+        if said is None:
+            self._dropped[f"point set {TOO_FAR}"] += 1
+            return
+        if self._options.separate:
+            self._ultrasonic.add_sorted(said.codes, said.log_odds)
         self._counts["point_sets"] += 1
         self._counts["points"] += len(points)
         self._enter(self._pairs.add_second(record.stamp, said))
+
+    def _observed(
+        self, origin: FloatArray, echoes: FloatArray, silent: FloatArray, model: InverseModel
+    ) -> Evidence | None:
+        """What a measurement says; None where it may reach beyond the bounds of the tree."""
+        resolution = self._options.resolution
+        # not >= but not <: a place that is not a number lies nowhere
+        if not (np.abs(origin).max() + model.max_range < (CENTRE - 1) * resolution):
+            return None
+        return observe(origin, echoes, silent, model, resolution)
 
     def _believed(self, record: PointSet) -> FloatArray:
         """Points that are numbers and within the field of view of the sensor."""
         points = record.points.astype(np.float64)
         finite = np.isfinite(points).all(axis=1)
-        model = self._options.ultrasonic
+        points, total = points[finite], len(points)
         ahead = points - record.origin
-        axis = np.array([np.cos(model.axis_yaw), np.sin(model.axis_yaw), 0.0])
-        seen = ahead @ axis >= np.cos(model.half_angle) * np.linalg.norm(ahead, axis=1) - 1e-9
-        for reason, count in ((NOT_FINITE, (~finite).sum()), (OUT_OF_FIELD, (finite & ~seen).sum())):
+        least = np.cos(self._options.ultrasonic.half_angle)
+        seen = ahead @ np.array(record.axis) >= least * np.linalg.norm(ahead, axis=1) - 1e-9
+        for reason, count in ((NOT_FINITE, total - len(points)), (OUT_OF_FIELD, int((~seen).sum()))):
             if count:
-                self._dropped[reason] += int(count)
-        return np.asarray(points[finite & seen])
+                self._dropped[reason] += count
+        return np.asarray(points[seen])
 
     def _enter(self, pairs: Iterable[tuple[Evidence | None, Evidence | None]]) -> None:
         """Join what two sensors said of the same moment, the missing one padded with zeros."""

@@ -162,6 +162,12 @@ class Octree:
         keys = leaves.keys
         return keys.min(axis=0), (keys + leaves.edges[:, None]).max(axis=0)
 
+    def volumes(self) -> tuple[int, int]:
+        """Number of voxels that are occupied, and of those that are free; larger cubes count as many."""
+        leaves = self.leaves()
+        voxels, occupied = leaves.edges**3, leaves.log_odds >= self.clamp.occupied
+        return int(voxels[occupied].sum()), int(voxels[~occupied].sum())
+
     def memory(self) -> Memory:
         """Nodes and bytes."""
         nodes, leaves = self.count()

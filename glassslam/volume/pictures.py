@@ -16,10 +16,12 @@ from glassslam.volume.projection import Band, project, top_heights
 Image = NDArray[np.uint8]
 
 _LARGEST_ZOOM, _READABLE, _READABLE_SLICE = 8, 900, 330
-_MOST_SLICES = 12
+_MOST_SLICES, _LARGEST_SLICE = 12, 1000
+_EMPTY = ("the volume is empty", "was there any echo, and a pose for it?")
 _STRIP, _MARGIN, _GAP = 48, 12, 10
 # blue, green, red: the order of OpenCV
 _INK, _PAPER, _UNKNOWN, _FREE = (40, 40, 40), (255, 255, 255), (225, 225, 225), (255, 255, 255)
+_SHADES = np.array([_UNKNOWN[0], _FREE[0], 0], dtype=np.uint8)
 
 
 def write_top_view(tree: Octree, path: str | Path, band: Band | None = None) -> Path:
@@ -66,7 +68,9 @@ def write_slices(tree: Octree, path: str | Path, band: Band | None = None) -> Pa
     """Draw horizontal slices side by side, as PNG: black occupied, white free, grey unknown.
 
     There are at most twelve: layers between which nothing is occupied are left out, the others are drawn
-    singly or, where there are too many, in bands of equal height that show their most occupied voxel.
+    singly or, where there are too many, in bands of equal height that show their most occupied voxel. Where
+    nothing is occupied at all, one slice shows what is free. Large slices are drawn smaller: a pixel is
+    occupied where anything in it is.
 
     Parameters
     ----------
@@ -84,9 +88,11 @@ def write_slices(tree: Octree, path: str | Path, band: Band | None = None) -> Pa
     OSError
         The file cannot be written.
     """
-    panels = [_panel(tree, part) for part in slice_bands(tree, band)]
-    if not panels or panels[0].size == 0:
-        raise OutputError("the volume is empty", "was there any echo, and a pose for it?")
+    low, high = tree.bounds()
+    if not low[2] < high[2]:
+        raise OutputError(*_EMPTY)
+    whole = band or (float(low[2]), float(high[2]))
+    panels = [_panel(tree, part) for part in slice_bands(tree, band) or [whole]]
     columns = math.ceil(math.sqrt(len(panels)))
     blank = np.full_like(panels[0], 255)
     panels += [blank] * (-len(panels) % columns)
@@ -110,10 +116,10 @@ def slice_bands(tree: Octree, band: Band | None = None) -> list[Band]:
 
 def _panel(tree: Octree, part: Band) -> Image:
     probability = project(tree, part).probability
-    _check_size(probability)
-    shade = np.full(probability.shape, _UNKNOWN[0], dtype=np.uint8)
-    shade[probability < tree.clamp.threshold] = _FREE[0]
-    shade[probability >= tree.clamp.threshold] = 0
+    known = np.zeros(probability.shape, dtype=np.uint8)
+    known[probability < tree.clamp.threshold] = 1
+    known[probability >= tree.clamp.threshold] = 2
+    shade = _SHADES[_shrunk(known, math.ceil(max(known.shape) / _LARGEST_SLICE))]
     picture = _enlarged(np.repeat(shade[::-1, :, None], 3, axis=2), _zoom(shade.shape, _READABLE_SLICE))
     framed = _bordered(picture, top=22, side=_GAP // 2)
     _write_text(framed, f"z {part[0]:.2f} to {part[1]:.2f} m", (_GAP // 2, 15))
@@ -153,9 +159,19 @@ def _round_length(longest: float) -> float:
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest * (1.0 + 1e-9))
 
 
+def _shrunk(cells: Image, factor: int) -> Image:
+    """The largest value of every square of cells, those at the far ends filled up with 0."""
+    if factor == 1:
+        return cells
+    rows, columns = (-(-side // factor) for side in cells.shape)
+    padded = np.zeros((rows * factor, columns * factor), dtype=np.uint8)
+    padded[: cells.shape[0], : cells.shape[1]] = cells
+    return np.asarray(padded.reshape(rows, factor, columns, factor).max(axis=(1, 3)))
+
+
 def _check_size(cells: Float32Array) -> None:
     if cells.size == 0:
-        raise OutputError("the volume is empty", "was there any echo, and a pose for it?")
+        raise OutputError(*_EMPTY)
 
 
 def _zoom(shape: tuple[int, ...], readable: int) -> int:

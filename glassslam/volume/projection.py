@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from glassslam.errors import GridError
+from glassslam.grid.probability_grid import MOST_CELLS
 from glassslam.records import Float32Array, FloatArray
 from glassslam.slam.result import OccupancyMap
 from glassslam.volume import projection_kernels as kernels
@@ -38,7 +39,7 @@ def project(tree: Octree, band: Band, rule: Rule = "max") -> OccupancyMap:
     Raises
     ------
     GridError
-        The band is empty or not finite, or there is no such rule.
+        The band is empty or not finite, there is no such rule, or the map would be too large for memory.
     """
     if rule not in get_args(Rule):
         raise GridError(f"there is no rule {rule!r} of projection", f"known: {', '.join(get_args(Rule))}")
@@ -95,6 +96,12 @@ def _extent(tree: Octree) -> tuple[Int64Array, tuple[int, int]]:
     """Key (x, y) of the lowest cell of all that is known, and the number of rows and columns."""
     low, high = tree.key_bounds()
     columns, rows = (high - low)[:2].tolist()
+    if columns * rows > MOST_CELLS:
+        width, length = columns * tree.resolution, rows * tree.resolution
+        raise GridError(
+            f"{width:.0f} x {length:.0f} m in voxels of {tree.resolution:g} m are too many for a map",
+            "raise volume.resolution",
+        )
     return low[:2].copy(), (rows, columns)
 
 

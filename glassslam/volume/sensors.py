@@ -25,8 +25,6 @@ class InverseModel:
         A beam says nothing farther away, m; an echo from there is read as free space up to there.
     half_angle : float
         Echoes farther from the axis of the sensor than this angle are not believed, rad.
-    axis_yaw : float
-        Where the horizontal axis of the sensor points in the base frame, rad.
 
     Raises
     ------
@@ -38,7 +36,6 @@ class InverseModel:
     occupied: float = 0.7
     max_range: float = 20.0
     half_angle: float = math.pi
-    axis_yaw: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.free <= 0.5 <= self.occupied < 1.0:

@@ -69,7 +69,7 @@ def test_version(capsys):
     [
         (["mapp"], "error: there is no command 'mapp' (did you mean 'map'?)"),
         (["zzz"], "error: there is no command 'zzz' (see glassslam --help)"),
-        (["map"], "error: Missing argument 'RECORDING...' (see glassslam map --help)"),
+        (["map"], "error: no recording is named (glassslam map RECORDING, or --resume DIR)"),
         (["--nonsense"], "error: No such option: --nonsense (see glassslam --help)"),
         (
             ["evaluate", "x.tum"],

@@ -12,7 +12,6 @@ import glassslam.calibration
 from detectors.beam_errors import BeamErrors
 from detectors.diffuse_fit import SurfaceSamples
 from detectors.profiles import load_profile
-from glassslam import api
 from glassslam.calibration import CalibrationResult, RecordingSummary
 from glassslam.cli import main
 from glassslam.cli.calibrate_tables import value_rows
@@ -165,38 +164,25 @@ def test_of_a_lidar_without_intensities_only_the_beams_are_shown(result):
     assert not {"diffuse level", "calibrated_peak", "intensity_peak"} & set(rows)
 
 
-@pytest.fixture
-def mapped(monkeypatch, tiny_result):
-    """Configurations with which a map was asked for."""
-    seen = []
-
-    def map_nothing(recordings, config, *, source_options, progress):
-        seen.append(config)
-        return tiny_result
-
-    monkeypatch.setattr(api, "map_recording", map_nothing)
-    return seen
-
-
 def written(tmp_path, **changes):
     path = tmp_path / "calibration.yaml"
     path.write_text(yaml.safe_dump(load_profile("utm30lx").to_dict() | changes))
     return path
 
 
-def test_map_embeds_the_calibration(mapped, tmp_path):
+def test_map_embeds_the_calibration(asked_runs, tmp_path):
     path = written(tmp_path)
     assert main(["map", "run.bag", "--calibration", str(path), "-o", str(tmp_path / "out"), "-q"]) == 0
-    (config,) = mapped
+    config = asked_runs[0].config
     assert config.glass.detector == "calibrated_peak"
     assert config.glass.calibration == load_profile("utm30lx").to_dict()
     assert (config.glass.thresh, config.glass.grad, config.glass.width) == (10254.0, 512.7, 20)
 
 
-def test_later_assignments_go_before_it(mapped, tmp_path):
+def test_later_assignments_go_before_it(asked_runs, tmp_path):
     words = ["--calibration", str(written(tmp_path)), "--set", "glass.detector=intensity_peak"]
     assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
-    assert mapped[0].glass.detector == "intensity_peak"
+    assert asked_runs[0].config.glass.detector == "intensity_peak"
 
 
 def used(config):
@@ -204,11 +190,11 @@ def used(config):
     return tuple(getattr(config.sensor, name) for name in names)
 
 
-def test_the_errors_of_the_beams_become_part_of_the_configuration(mapped, tmp_path):
+def test_the_errors_of_the_beams_become_part_of_the_configuration(asked_runs, tmp_path):
     path = written(tmp_path, beam_errors=BEAMS.to_dict())
     assert main(["map", "run.bag", "--calibration", str(path), "-o", str(tmp_path / "out"), "-q"]) == 0
-    assert used(mapped[0]) == (0.0079, 0.0021, -0.0233, -0.0048)
-    assert calibration_warnings(mapped[0]) == []
+    assert used(asked_runs[0].config) == (0.0079, 0.0021, -0.0233, -0.0048)
+    assert calibration_warnings(asked_runs[0].config) == []
 
 
 def test_a_calibration_without_them_leaves_those_of_the_configuration(tmp_path):
@@ -218,23 +204,23 @@ def test_a_calibration_without_them_leaves_those_of_the_configuration(tmp_path):
     assert used(config) == (0.0, 0.0, 0.0, 0.01)
 
 
-def test_what_is_set_goes_before_the_calibrated_beams(mapped, tmp_path):
+def test_what_is_set_goes_before_the_calibrated_beams(asked_runs, tmp_path):
     words = ["--calibration", str(written(tmp_path, beam_errors=BEAMS.to_dict()))]
     words += ["--set", "sensor.bearing_cosine=0.001"]
     assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
-    assert used(mapped[0]) == (0.001, 0.0021, -0.0233, -0.0048)
-    assert calibration_warnings(mapped[0]) == [
+    assert used(asked_runs[0].config) == (0.001, 0.0021, -0.0233, -0.0048)
+    assert calibration_warnings(asked_runs[0].config) == [
         "the beams are not corrected as calibrated: sensor.bearing_cosine is 0.001, not 0.0079"
     ]
 
 
-def test_a_file_of_parameters_goes_before_the_calibrated_beams(mapped, tmp_path):
+def test_a_file_of_parameters_goes_before_the_calibrated_beams(asked_runs, tmp_path):
     path, stated = written(tmp_path, beam_errors=BEAMS.to_dict()), tmp_path / "config.yaml"
     stated.write_text("sensor: {max_range: 8, lateral_offset: 0.0}")
     words = ["--calibration", str(path), "--config", str(stated)]
     assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out"), "-q"]) == 0
-    assert used(mapped[0]) == (0.0079, 0.0021, 0.0, -0.0048)
-    assert mapped[0].sensor.max_range == 8.0
+    assert used(asked_runs[0].config) == (0.0079, 0.0021, 0.0, -0.0048)
+    assert asked_runs[0].config.sensor.max_range == 8.0
 
 
 def test_a_damaged_entry_is_named(tmp_path):
@@ -266,7 +252,7 @@ def test_a_calibration_that_rules_glass_out_is_told(tmp_path):
         ("sensor: x\ndiffuse: {ranges: [1], levels: [0]}", "calibration {path}: ranges of a diffuse curve"),
     ],
 )
-def test_a_file_that_is_no_calibration(mapped, tmp_path, capsys, text, message):
+def test_a_file_that_is_no_calibration(asked_runs, tmp_path, capsys, text, message):
     path = tmp_path / "c.yaml"
     if text is not None:
         path.write_text(text)
@@ -274,11 +260,11 @@ def test_a_file_that_is_no_calibration(mapped, tmp_path, capsys, text, message):
     error = capsys.readouterr().err
     assert error.startswith(f"error: {message.format(path=path)}")
     assert error.count("\n") == 1
-    assert mapped == []
+    assert asked_runs == []
 
 
-def test_a_calibration_and_a_sensor_exclude_each_other(mapped, tmp_path, capsys):
+def test_a_calibration_and_a_sensor_exclude_each_other(asked_runs, tmp_path, capsys):
     words = ["--calibration", str(written(tmp_path)), "--sensor", "utm30lx"]
     assert main(["map", "run.bag", *words, "-o", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.startswith("error: --calibration and --sensor exclude each other")
-    assert mapped == []
+    assert asked_runs == []

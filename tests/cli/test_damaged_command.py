@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from glassslam import api
 from glassslam.cli import main
 from glassslam.outputs import build_report
 from glassslam.records import Damage, LaserScan
@@ -58,18 +57,11 @@ def test_inspect_tells_the_damage(cut_bag, capsys):
     assert damage["file"] == str(cut_bag)
 
 
-def test_strict_reaches_the_source(monkeypatch, tiny_result, tmp_path):
-    seen = []
-
-    def map_nothing(recordings, config, *, source_options, progress):
-        seen.append(source_options.strict)
-        return tiny_result
-
-    monkeypatch.setattr(api, "map_recording", map_nothing)
+def test_strict_reaches_the_source(asked_runs, tmp_path):
     words = ["map", "run.bag", "-o", str(tmp_path / "out"), "-q", "--overwrite"]
     assert main(words) == 0
     assert main([*words, "--strict"]) == 0
-    assert seen == [False, True]
+    assert [asked.options.strict for asked in asked_runs] == [False, True]
 
 
 def test_the_report_lists_damage(tiny_result):

@@ -16,56 +16,44 @@ from glassslam.records import LaserScan, RecordingInfo
 from glassslam.simulation.rosbag1 import write_rosbag1
 
 
-@pytest.fixture
-def calls(monkeypatch, tiny_result):
-    """Arguments of the mapping, which itself is replaced by the tiny run."""
-    seen = []
-
-    def map_nothing(recordings, config, *, source_options, progress):
-        seen.append((recordings, config, source_options, progress))
-        return tiny_result
-
-    monkeypatch.setattr(api, "map_recording", map_nothing)
-    return seen
-
-
-def test_results_are_written_and_told(calls, tmp_path, capsys):
+def test_results_are_written_and_told(asked_runs, tmp_path, capsys):
     assert main(["map", "run.bag", "-o", str(tmp_path / "out")]) == 0
     captured = capsys.readouterr()
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(RESULT_FILES)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted([*RESULT_FILES, "session.db"])
     for name in RESULT_FILES:
         assert name in captured.out
     assert "2 read, 2 used, none dropped" in captured.out
     assert captured.err == ""
 
 
-def test_options_reach_the_source_and_the_configuration(calls, tmp_path):
+def test_options_reach_the_source_and_the_configuration(asked_runs, tmp_path):
     words = "--scan-topic /a --odom-topic /b --imu-topic /c --laser-pose -0.1,0,3 --start 1 --duration 2"
     words += " --every 3 --echo last --set sensor.max_range=7"
     assert main(["map", "a.bag", "b.bag", "-o", str(tmp_path / "out"), *words.split()]) == 0
-    ((recordings, config, options, _),) = calls
-    assert [path.name for path in recordings] == ["a.bag", "b.bag"]
+    (asked,) = asked_runs
+    config, options = asked.config, asked.options
+    assert [path.name for path in asked.recordings] == ["a.bag", "b.bag"]
     assert config.sensor.max_range == 7.0
     assert (options.scan_topic, options.odom_topic, options.imu_topic) == ("/a", "/b", "/c")
     assert options.laser_pose == (-0.1, 0.0, 3.0)
     assert (options.start, options.duration, options.every, options.echo) == (1.0, 2.0, 3, "last")
 
 
-def test_intensities_can_be_required(calls, tmp_path):
+def test_intensities_can_be_required(asked_runs, tmp_path):
     assert main(["map", "a.bag", "-o", str(tmp_path / "out"), "--require-intensity", "-q"]) == 0
     assert main(["map", "a.bag", "-o", str(tmp_path / "out"), "--overwrite", "-q"]) == 0
-    assert [config.glass.require_intensity for _, config, _, _ in calls] == [True, False]
+    assert [asked.config.glass.require_intensity for asked in asked_runs] == [True, False]
 
 
 @pytest.mark.parametrize("detector", ["off", "narrow_return"])
-def test_intensities_cannot_be_required_of_a_run_that_uses_none(calls, tmp_path, capsys, detector):
+def test_intensities_cannot_be_required_of_a_run_that_uses_none(asked_runs, tmp_path, capsys, detector):
     words = ["--require-intensity", "--set", f"glass.detector={detector}"]
     assert main(["map", "a.bag", "-o", str(tmp_path / "out"), *words]) == 2
     assert capsys.readouterr().err == (
         f"error: --require-intensity: the detector {detector} uses no intensities "
         "(leave one of them out, or choose another detector)\n"
     )
-    assert calls == []
+    assert asked_runs == []
 
 
 def test_required_intensities_that_are_missing_are_an_error(tmp_path, capsys):
@@ -100,10 +88,10 @@ def test_the_summary_counts_glass(tiny_result):
     assert rows["glass"] == "1 wall of 2.0 m, 9 observations by calibrated_peak (the calibration given)"
 
 
-def test_sonar_options_reach_the_source(calls, tmp_path):
+def test_sonar_options_reach_the_source(asked_runs, tmp_path):
     words = "--sonar ring.txt --sonar-topic /a --sonar-topic /b --sonar-ring pioneer-3dx"
     assert main(["map", "a.bag", "-o", str(tmp_path / "out"), *words.split()]) == 0
-    ((_, _, options, _),) = calls
+    options = asked_runs[0].options
     assert (options.sonar.name, options.sonar_topic, options.sonar_ring) == (
         "ring.txt",
         ("/a", "/b"),
@@ -111,39 +99,39 @@ def test_sonar_options_reach_the_source(calls, tmp_path):
     )
 
 
-def test_without_a_directory_results_are_named_after_the_recording(calls, tmp_path, monkeypatch):
+def test_without_a_directory_results_are_named_after_the_recording(asked_runs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["map", "some/run.bag", "--quiet"]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["run-map"]
 
 
-def test_json_is_the_report_and_nothing_else(calls, tmp_path, capsys):
+def test_json_is_the_report_and_nothing_else(asked_runs, tmp_path, capsys):
     assert main(["map", "run.bag", "-o", str(tmp_path / "out"), "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["directory"] == str(tmp_path / "out")
     assert report["nodes"] == 2
 
 
-def test_quiet_prints_nothing(calls, tmp_path, capsys):
+def test_quiet_prints_nothing(asked_runs, tmp_path, capsys):
     assert main(["map", "run.bag", "-o", str(tmp_path / "out"), "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("drop", ["scans_dropped", "messages_dropped"])
-def test_dropped_data_is_told_and_gives_code_3(calls, tiny_result, tmp_path, capsys, drop):
+def test_dropped_data_is_told_and_gives_code_3(asked_runs, tiny_result, tmp_path, capsys, drop):
     getattr(tiny_result.statistics, drop)["no range"] = 5
     assert main(["map", "run.bag", "-o", str(tmp_path / "out")]) == 3
     assert "5 x no range" in capsys.readouterr().out
     assert (tmp_path / "out" / "map.pgm").exists()
 
 
-def test_earlier_results_are_found_before_any_work_is_done(calls, tmp_path, capsys):
+def test_earlier_results_are_found_before_any_work_is_done(asked_runs, tmp_path, capsys):
     (tmp_path / "map.pgm").write_text("old")
     assert main(["map", "run.bag", "-o", str(tmp_path)]) == 2
     assert capsys.readouterr().err == (
         f"error: {tmp_path} already holds results (use --overwrite to replace them)\n"
     )
-    assert calls == []
+    assert asked_runs == []
     assert main(["map", "run.bag", "-o", str(tmp_path), "--overwrite", "--quiet"]) == 0
     assert (tmp_path / "map.pgm").read_bytes().startswith(b"P5")
 
@@ -151,17 +139,17 @@ def test_earlier_results_are_found_before_any_work_is_done(calls, tmp_path, caps
 @pytest.mark.parametrize(
     "words", ["--every 0", "--start -1", "--duration nan", "--echo loudest", "--set x=1"]
 )
-def test_values_out_of_their_domain_are_wrong_usage(calls, tmp_path, capsys, words):
+def test_values_out_of_their_domain_are_wrong_usage(asked_runs, tmp_path, capsys, words):
     assert main(["map", "run.bag", "-o", str(tmp_path / "out"), *words.split()]) == 2
     assert capsys.readouterr().err.startswith("error: ")
-    assert calls == []
+    assert asked_runs == []
 
 
 def test_a_failure_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
     def fail(*_, **__):
         raise RecordingError("run.bag is truncated", "record it again")
 
-    monkeypatch.setattr(api, "map_recording", fail)
+    monkeypatch.setattr("glassslam.sources.open_recording", fail)
     assert main(["map", "run.bag", "-o", str(tmp_path / "deep" / "out")]) == 1
     assert capsys.readouterr().err == "error: run.bag is truncated (record it again)\n"
     assert list(tmp_path.iterdir()) == []

@@ -113,9 +113,8 @@ class TestRecording:
             cells = np.full((60, 120), 0.1, np.float32)
             cells[50:52] = 0.9
             lidar = OccupancyMap(cells, 0.05, (-1.5, -0.5))
-            listener = SonarListener(ring(LEFT), SonarConfig(**config))
-            for stamp in stamps:
-                listener.add(RangeRing(float(stamp), np.array([1.0], np.float32)))
+            sweeps = [RangeRing(float(stamp), np.array([1.0], np.float32)) for stamp in stamps]
+            listener = SonarListener(ring(LEFT), SonarConfig(**config), sweeps)
             run = replace(tiny_result, map=lidar, lidar_map=lidar, tracks=tracks)
             return listener.joined(run).sonar
 
@@ -191,10 +190,9 @@ def test_two_sonars_can_stand_for_the_ring(tiny_result, draw_map):
 
     def x_of_walls(sonars):
         config = SonarConfig.model_validate({"fusion": {"method": "attach", "sonars": sonars}})
-        listener = SonarListener(ring(LEFT, 0.0, RIGHT), SonarConfig())
-        for stamp in (0.0, 0.5, 1.0, 1.5):
-            listener.add(RangeRing(stamp, np.array([1.0, 1.5, 1.0], np.float32)))
-        heard = listener.with_config(config).joined(run).sonar.sonar_map
+        readings = np.array([1.0, 1.5, 1.0], np.float32)
+        sweeps = [RangeRing(stamp, readings) for stamp in (0.0, 0.5, 1.0, 1.5)]
+        heard = SonarListener(ring(LEFT, 0.0, RIGHT), config, sweeps).joined(run).sonar.sonar_map
         columns = np.flatnonzero((heard.probability > 0.65).any(axis=0))
         return heard.origin[0] + (columns + 0.5) * heard.resolution
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from glassslam import api
 from glassslam.cli import main
 from glassslam.errors import OutputError
 from glassslam.outputs import directory, staged_directory
@@ -35,11 +34,44 @@ def other_run(tmp_path):
     process.stdout.close()
 
 
-def test_the_second_run_is_refused_in_one_line(tmp_path, other_run, capsys):
-    assert main(["map", "any.bag", "-o", str(tmp_path / "run")]) == 1
+COMMANDS = {
+    "map": ["map", "any.bag"],
+    "calibrate": ["calibrate", "any.bag"],
+    "volume": ["volume", "any.bag"],
+    "simulate": ["simulate", "office"],
+    "demo": ["demo"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_second_run_is_refused_in_one_line(tmp_path, other_run, capsys, command):
+    assert main([*COMMANDS[command], "-o", str(tmp_path / "run")]) == 1
     assert capsys.readouterr().err == (
         f"error: another run is writing to {tmp_path / 'run'} (wait for it, or choose another directory)\n"
     )
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_lock_is_left_by_a_command_that_failed(tmp_path, command):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "a friend's letter").write_text("...")
+    (tmp_path / "any.bag").write_text("no recording")
+    words = [str(tmp_path / word) if word == "any.bag" else word for word in COMMANDS[command]]
+    assert main([*words, "-o", str(tmp_path / "run")]) in {1, 2}
+    assert sorted(os.listdir(tmp_path)) == ["any.bag", "run"]  # noqa: PTH208
+
+
+def test_a_lock_left_by_a_killed_demo_is_no_foreign_file(tmp_path, monkeypatch):
+    (tmp_path / ".map.lock").write_text("")
+    monkeypatch.setattr("glassslam.simulation.simulate", None)
+    demo = ["demo", "-o", str(tmp_path)]
+    (tmp_path / "letter").write_text("...")
+    assert main(demo) == 1
+    (tmp_path / "letter").unlink()
+    with pytest.raises(TypeError, match="not callable"):
+        from glassslam.cli.demo import demo as run
+
+        run(tmp_path)
 
 
 def test_other_directories_are_free(tmp_path, other_run):
@@ -59,7 +91,7 @@ def test_the_lock_is_gone_after_a_run_that_failed(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise OutputError("no luck")
 
-    monkeypatch.setattr(api, "map_recording", fail)
+    monkeypatch.setattr("glassslam.sources.open_recording", fail)
     assert main(["map", "any.bag", "-o", str(tmp_path / "deep" / "run")]) == 1
     assert list(tmp_path.iterdir()) == []
 

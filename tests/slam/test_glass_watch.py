@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from glassslam.config import GlassConfig, SensorConfig
 from glassslam.records import LaserScan, Trajectory
 from glassslam.slam.glass_watch import GlassWatch
-from glassslam.slam.local import LocalResult
+from glassslam.slam.local import LocalResult, Match
 from glassslam.slam.node import Node
 from glassslam.slam.range_data import base_motion, prepare
 from glassslam.slam.trajectory import PoseTracks
@@ -41,7 +41,7 @@ def placed(pose, node=None):
     """What local SLAM says of a scan that became node number `node`, or none."""
     pose = np.array(pose, dtype=np.float64)
     made = None if node is None else Node(node, node, 0.0, pose, np.zeros(2), NONE, NONE, 0.1)
-    return LocalResult(pose, made, [], None)
+    return LocalResult(Match(pose, 0.1), made, [], [])
 
 
 def tracks(count):
@@ -134,8 +134,7 @@ def test_scans_that_came_before_the_decision_are_looked_at_after_it():
         assert look.sighting() is None
         watch.add(look, placed((0.1 * k, 0.0, 0.0), k))
     watch.settle()
-    layer = watch.layer([placed(STILL, k).node for k in range(12)], tracks(12))
-    assert layer.beams.stamps.tolist() == [one.stamp for one in scans]
+    assert watch.findings().beams.stamps.tolist() == [one.stamp for one in scans]
 
 
 def test_whether_a_scan_waited_for_the_decision_makes_no_difference():
@@ -149,6 +148,6 @@ def test_whether_a_scan_waited_for_the_decision_makes_no_difference():
     assert np.array_equal(waited.observations().node, at_once.observations().node)
 
 
-def test_without_a_detector_there_is_no_layer():
+def test_without_a_detector_there_are_no_findings():
     watch = watched((shining(50), placed(STILL, 0)), config=GlassConfig(detector="off"))
-    assert watch.layer([], tracks(0)) is None
+    assert watch.findings() is None

@@ -59,7 +59,7 @@ def test_odometry_that_freezes_and_catches_up_in_a_jump_is_survived():
         wheels[k] = wheels[11 if k < 20 else 29]
     found, local = track(path, wheels)
     assert errors(found, path)[0].max() < 0.06
-    assert local.coasted > 0
+    assert local.tracking.coasted > 0
 
 
 def test_after_a_gap_in_the_recording_a_robot_that_turned_and_moved_is_found_again():
@@ -70,7 +70,7 @@ def test_after_a_gap_in_the_recording_a_robot_that_turned_and_moved_is_found_aga
     distance, turn = errors(found, poses)
     assert distance[46:].max() < 0.05
     assert turn[46:].max() < 0.02
-    assert local.relocalised >= 1
+    assert local.tracking.relocalised >= 1
 
 
 def test_scans_with_too_few_returns_keep_their_prediction():
@@ -78,11 +78,11 @@ def test_scans_with_too_few_returns_keep_their_prediction():
     full = range_data(Lidar(ROOM).look(9.0, PATH[40]))
     few = type(full)(9.0, full.sensor, full.returns[:9], full.free_ends)
     expected = found[-1] + np.array([0.08, 0.04, 0.01])
-    assert local.unmatched == 0
+    assert local.tracking.unmatched == 0
     np.testing.assert_array_equal(local.add(few, prediction(expected)).pose_in_local, expected)
-    assert local.unmatched == 1
+    assert local.tracking.unmatched == 1
     assert np.abs(local.add(full, prediction(expected)).pose_in_local - expected).max() > 0.02
-    assert local.unmatched == 1
+    assert local.tracking.unmatched == 1
 
 
 def test_a_scan_without_any_return_is_no_error():
@@ -91,14 +91,14 @@ def test_a_scan_without_any_return_is_no_error():
     assert len(data.returns) == 0
     for k in range(3):
         local.add(data, prediction((0.3 * k, 0, 0)))
-    assert local.unmatched == 2
+    assert local.tracking.unmatched == 2
     assert len(local.finish()) == 1
 
 
 @pytest.mark.parametrize(("mode", "searches"), [("always", 19), ("never", 0)])
 def test_the_correlative_search_can_be_asked_for_or_left_out(mode, searches):
     found, local = track(PATH[:20], config=configured(local={"correlative_search": mode}))
-    assert local.searches == searches
+    assert local.tracking.searches == searches
     assert errors(found, PATH[:20])[0].max() < 0.05
 
 
@@ -107,7 +107,7 @@ def test_a_doubtful_match_is_searched_around():
     poses = np.vstack((PATH[:60], [PATH[59] + np.array([0.15, 0.15, 0.25])] * 3))
     wheels = odometry(PATH[:60])
     found, local = track(poses, np.vstack((wheels, [wheels[-1]] * 3)))
-    assert local.searches_taken >= 1
+    assert local.tracking.searches_taken >= 1
     assert errors(found, poses)[0].max() < 0.05
 
 
@@ -139,7 +139,7 @@ class TestNodes:
             pose = in_first_frame(PATH)[6 * k]
             result = local.add(range_data(lidar.look(0.1 * k, PATH[6 * k])), prediction(pose))
             entered.append([submap.index for submap in result.submaps])
-            finished += [] if result.finished is None else [result.finished]
+            finished += result.finished
         assert entered == [[0], [0], [0, 1], [0, 1], [1, 2], [1, 2], [2, 3], [2, 3], [3, 4]]
         assert [submap.nodes for submap in finished] == [[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 6, 7]]
         assert all(submap.finished for submap in finished)

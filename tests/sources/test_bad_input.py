@@ -1,6 +1,5 @@
 """Whatever is named as a recording: one clear line, never a foreign exception."""
 
-import gzip
 import os
 from functools import partial
 
@@ -41,7 +40,7 @@ def one_line(error):
         (b"", "is empty"),
         (b"%PDF-1.4 something else", "is no recording known here"),
         (b"\x00\x01\x02" * 1000, "is no recording known here"),
-        (b"FLASER 1 1.0 \x00\x00", "is no recording known here"),
+        (b"FLASER 1 \x00\x00 1.0", "is no recording known here"),
         (b"\x1f\x8b\x08\x00 no gzip at all", "is no recording known here"),
         (b"#ROSBAG V1.2\n", "is a ROS1 bag of an old version"),
         (b"\x28\xb5\x2f\xfd....", "is zstd-compressed"),
@@ -196,16 +195,6 @@ def test_a_bad_chunk_in_the_middle(tmp_path):
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"cannot read .*: Invalid data stream"):
         drain(path, strict=True)
-
-
-@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
-def test_a_truncated_gzip_log(tmp_path, share):
-    packed = gzip.compress(LOG)
-    path = tmp_path / "run.clf.gz"
-    path.write_bytes(packed[: int(len(packed) * share)])
-    with pytest.raises(RecordingError, match=r"cannot read .*: Compressed file ended") as caught:
-        open_recording(path)
-    assert "gzip -t" in caught.value.hint
 
 
 def test_pieces_of_different_formats(tmp_path):

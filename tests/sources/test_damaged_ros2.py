@@ -228,20 +228,6 @@ def test_damage_found_on_the_way_costs_rows_and_repeats_none(tmp_path, long_db3)
         read(path, strict=True)
 
 
-def test_rows_a_recorder_has_not_merged_are_told(tmp_path):
-    path = WHOLE["sqlite3"](tmp_path)
-    log = path.with_name(path.name + "-wal")
-    log.write_bytes(b"x" * 4000)
-    records, (damage,) = read(path)
-    assert len(records) == len(DRIVE)
-    assert (damage.file, damage.bytes) == (str(log), 4000)
-    assert damage.reason.startswith("not merged into the database")
-    with pytest.raises(RecordingError, match="not merged into the database"):
-        read(path, strict=True)
-    log.write_bytes(b"")
-    assert read(path)[1] == ()
-
-
 def test_a_database_of_something_else(tmp_path):
     path = tmp_path / "run.db3"
     with sqlite3.connect(path) as database:

@@ -292,8 +292,11 @@ def test_compressed_and_in_pieces(tmp_path):
         12.0,
     ]
     paths[1].write_bytes(paths[1].read_bytes()[:-12])
-    with pytest.raises(RecordingError, match="Compressed file ended"):
-        open_recording(paths)
+    cut = open_recording(paths)
+    assert [scan.stamp for scan in only(cut, LaserScan)][:5] == [0.0, 1.0, 2.0, 10.0, 11.0]
+    assert cut.damage[0].file == str(paths[1])
+    with pytest.raises(RecordingError, match="the file is cut off here"):
+        open_recording(paths, SourceOptions(strict=True))
 
 
 def test_a_log_without_a_laser(log):

@@ -77,19 +77,13 @@ def test_poses_of_a_pimap_log(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "lines are of different lengths"),
-        (
-            pimap_line(0, 0, [1, 2, 3])
-            + "\n"
-            + pimap_line(1, 0, [1, 2])
-            + "\n"
-            + pimap_line(2, 0, [1, 2, 3]),
-            "different",
-        ),
-        (pimap_line(0, 0, [1, "x", 3]), "could not convert"),
+        ("", "is no pi-map log: 0 of 0 lines cannot be read"),
+        ("hello\n" * 3, "3 of 3 lines cannot be read"),
+        (pimap_line(0, 0, [1, "x", 3]), "1 of 1 lines cannot be read"),
+        ((pimap_line(0, 0, [1, 2, 3]) + "\nx\ny\n") * 5, "10 of 15 lines cannot be read"),
     ],
 )
-def test_damaged_pimap_logs(tmp_path, text, message):
+def test_pimap_logs_that_are_none(tmp_path, text, message):
     path = tmp_path / "bad.txt"
     path.write_text(text)
     with pytest.raises(RecordingError, match=message):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from volume_worlds import NaiveVolume, listed, naive_code, voxel
+from volume_worlds import NaiveVolume, drawn_tree, listed, naive_code, voxel
 
 from glassslam.errors import GridError
 from glassslam.volume.octree import CENTRE, Leaves, Octree, decode, encode
@@ -221,3 +221,9 @@ def test_a_threshold_must_lie_between_the_bounds():
     with pytest.raises(GridError, match=r"a threshold of 0\.99 is never crossed") as error:
         Clamp(threshold=0.99)
     assert error.value.hint == "it must lie between 0.1192 and 0.971"
+
+
+@pytest.mark.parametrize("layers", [["#.?\n.?#"], ["#."], ["##\n##", "##\n##"], ["..\n..", "..\n.."]])
+def test_voxels_are_counted_whether_they_are_merged_or_not(layers):
+    drawing = "".join(layers)
+    assert drawn_tree(layers).volumes() == (drawing.count("#"), drawing.count("."))

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from volume_worlds import occupied_share
 
 from glassslam.geometry import inverse, transform_points
 from glassslam.records import LaserScan, PointSet, Trajectory
 from glassslam.simulation import Scene, find_scene, simulate
-from glassslam.volume.mapper import VolumeOptions, build_volume
+from glassslam.volume.mapper import build_volume
+from glassslam.volume.options import VolumeOptions
 from glassslam.volume.projection import project
 
 BAND = (0.05, 1.8)
@@ -20,18 +22,6 @@ def storeroom():
     options = VolumeOptions(lidar_height=scene.laser_height)
     records = list(simulation.records())
     return scene, build_volume(records, simulation.truth, options, scene.laser_pose), records, simulation
-
-
-def occupied_share(grid, points):
-    """Share of points (n, 2) whose cell or a neighbour is occupied in a map."""
-    filled = grid.probability > 0.65
-    padded = np.pad(filled, 1)
-    grown = np.any([np.roll(padded, (dy, dx), (0, 1)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)], axis=0)[
-        1:-1, 1:-1
-    ]
-    column, row = np.floor((np.asarray(points) - grid.origin) / grid.resolution).astype(int).T
-    inside = (row >= 0) & (row < filled.shape[0]) & (column >= 0) & (column < filled.shape[1])
-    return (grown[row.clip(0, filled.shape[0] - 1), column.clip(0, filled.shape[1] - 1)] & inside).mean()
 
 
 def line(start, end):

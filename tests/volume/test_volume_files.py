@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from volume_worlds import drawn_tree, listed
 
 from glassslam.errors import OutputError, UsageError
+from glassslam.volume import pictures
 from glassslam.volume.colours import height_colours
 from glassslam.volume.files import VOLUME_FILES, check_folder, write_volume
 from glassslam.volume.octomap_file import most_likely, read_octomap, write_octomap
@@ -281,6 +282,23 @@ def test_the_slice_of_the_lamp_shows_it_black_and_the_unknown_grey(lamp, tmp_pat
     picture = cv2.imread(str(write_slices(lamp, tmp_path / "slices.png")), cv2.IMREAD_GRAYSCALE)
     cells = picture[22 + 4 : 22 + 24 : 8, 5 + 4 : 5 + 32 : 8].tolist()
     assert cells == [[225] * 4, [225, 0, 0, 225], [225] * 4]
+
+
+def test_where_nothing_is_occupied_one_slice_shows_what_is_free(tmp_path):
+    bare = drawn_tree(["....\n.??.\n...."], 0.1)
+    for band in (None, (0.0, 0.1)):
+        picture = cv2.imread(str(write_slices(bare, tmp_path / "slices.png", band)), cv2.IMREAD_GRAYSCALE)
+        panel = picture[22:-5, 5 : 5 + 4 * 8]
+        assert (panel == 255).mean() == pytest.approx(10 / 12)
+        assert (panel == 225).mean() == pytest.approx(2 / 12)
+
+
+def test_a_large_slice_is_drawn_smaller_and_loses_nothing_that_is_occupied(lamp, tmp_path, monkeypatch):
+    monkeypatch.setattr(pictures, "_LARGEST_SLICE", 3)
+    monkeypatch.setattr(pictures, "_READABLE_SLICE", 1)
+    picture = cv2.imread(str(write_slices(lamp, tmp_path / "slices.png")), cv2.IMREAD_GRAYSCALE)
+    # four by three cells, two by two a pixel; the row left over is at the highest y
+    assert picture[22:-5, 5:7].tolist() == [[225, 225], [0, 0]]
 
 
 @pytest.mark.parametrize("write", [write_top_view, write_slices])

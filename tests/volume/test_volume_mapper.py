@@ -1,15 +1,19 @@
 """Scans and points along a trajectory become one volume."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glassslam.config import Config
 from glassslam.errors import GridError
 from glassslam.records import LaserScan, Odometry, PointSet, Trajectory
-from glassslam.volume.mapper import VolumeMapper, VolumeOptions, build_volume
+from glassslam.volume.mapper import VolumeMapper, build_volume
+from glassslam.volume.odds import Clamp
+from glassslam.volume.options import VolumeOptions, volume_options
 from glassslam.volume.sensors import InverseModel
 from glassslam.volume.track import Track
 
@@ -99,9 +103,11 @@ def test_points_outside_of_the_field_of_view_or_without_numbers_are_counted():
 
 
 def test_a_sensor_that_looks_back_sees_what_is_behind():
-    back = InverseModel(max_range=4.0, half_angle=math.pi / 2, axis_yaw=math.pi)
-    volume = build_volume([points([-1.0, 0.0, 0.5])], STANDING, VolumeOptions(ultrasonic=back))
-    assert volume.dropped == {}
+    back = replace(points([-1.0, 0.0, 0.5], [1.0, 0.0, 0.5]), axis=(-1.0, 0.0, 0.0))
+    volume = build_volume([back], STANDING)
+    assert volume.counts["points"] == 1
+    assert volume.dropped == {"point outside of the field of view": 1}
+    assert value(volume.ultrasonic, -1.0, 0.0, 0.5) == pytest.approx(HIT)
 
 
 def test_an_echo_beyond_four_metres_is_free_space():
@@ -138,6 +144,51 @@ def test_a_turning_sweep_is_straightened():
     assert volume.lidar.centres(volume.lidar.occupied()).tolist() == [pytest.approx([2.025, 0.025, 0.225])]
 
 
+def test_measurements_that_may_leave_the_tree_are_dropped_and_counted():
+    far = Trajectory(np.zeros(1), np.array([[1630.0, 0.0, 0.0]]))
+    volume = build_volume([scan(), points([1.0, 0.0, 0.5])], far)
+    assert volume.counts["scans"] == 0
+    assert volume.counts["point_sets"] == 1
+    assert volume.dropped == {"scan too far from the origin of the volume": 1}
+    lost = build_volume([points([1.0, 0.0, 0.5])], Trajectory(np.zeros(1), np.array([[0.0, 1e9, 0.0]])))
+    assert lost.dropped == {"point set too far from the origin of the volume": 1}
+
+
+def test_without_separate_volumes_the_joint_one_is_the_same():
+    records = [scan(), points([1.01, 0.01, 0.21], stamp=0.02)]
+    both, alone = (build_volume(records, STANDING, VolumeOptions(separate=flag)) for flag in (True, False))
+    assert np.array_equal(both.fused.leaves().log_odds, alone.fused.leaves().log_odds)
+    assert (alone.lidar.count(), alone.ultrasonic.count()) == ((0, 0), (0, 0))
+
+
+def test_the_defaults_of_the_configuration_are_those_of_the_options():
+    usual = volume_options(Config().volume)
+    assert usual == VolumeOptions(separate=False)
+
+
+def test_the_configuration_says_how_a_volume_is_made():
+    changes = {
+        "resolution": 0.1, "lidar_height": 0.5, "pool": "lop", "lidar_weight": 2.0, "ultrasonic_weight": 1.0,
+        "max_pairing_time": 0.2, "lidar_free": 0.3, "lidar_occupied": 0.8, "lidar_max_range": 9.0,
+        "ultrasonic_free": 0.45, "ultrasonic_occupied": 0.6, "ultrasonic_max_range": 3.0,
+        "ultrasonic_half_angle_deg": 45.0, "min_probability": 0.2, "max_probability": 0.9,
+        "occupied_threshold": 0.6,
+    }  # fmt: skip
+    config = Config.from_mapping({"volume": changes, "sensor": {"max_range": 7.0}})
+    assert volume_options(config.volume, config.sensor, laser_height=0.3) == VolumeOptions(
+        resolution=0.1,
+        clamp=Clamp(0.2, 0.9, 0.6),
+        lidar=InverseModel(0.3, 0.8, 9.0),
+        ultrasonic=InverseModel(0.45, 0.6, 3.0, math.pi / 4),
+        lidar_height=0.5,
+        slop=0.2,
+        pool="lop",
+        weights=(2.0, 1.0),
+        ranges=config.sensor,
+        separate=False,
+    )
+
+
 def test_a_trajectory_needs_a_pose():
     with pytest.raises(GridError, match="the trajectory has no pose"):
         VolumeMapper(Trajectory(np.empty(0), np.empty((0, 3))))
@@ -171,3 +222,17 @@ def test_a_track_turns_the_short_way_and_ignores_the_order_of_its_poses():
 def test_equal_stamps_are_no_division_by_zero():
     track = Track(Trajectory(np.zeros(2), np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])))
     assert np.isfinite(track.at(0.0)).all()
+
+
+def test_nothing_is_known_within_a_long_gap_in_which_the_robot_moved():
+    track = Track(Trajectory(np.array([0.0, 10.0]), np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]])))
+    assert track.at(0.4) == pytest.approx([0.0, 0.0, 0.0])
+    assert track.at(9.6) == pytest.approx([3.0, 0.0, 0.0])
+    assert [track.at(stamp) for stamp in (0.6, 5.0, 9.4)] == [None, None, None]
+
+
+def test_a_robot_that_stands_is_where_it_was_however_long():
+    track = Track(Trajectory(np.array([0.0, 100.0]), np.array([[1.0, 2.0, 0.3], [1.02, 2.0, 0.31]])))
+    assert track.at(50.0) == pytest.approx([1.01, 2.0, 0.305])
+    turned = Track(Trajectory(np.array([0.0, 100.0]), np.array([[1.0, 2.0, 0.3], [1.02, 2.0, 0.51]])))
+    assert turned.at(50.0) is None

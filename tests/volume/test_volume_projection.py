@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from volume_worlds import drawing_of, drawn_tree
 
 from glassslam.errors import GridError
+from glassslam.volume import projection
 from glassslam.volume.octree import CENTRE, Octree, encode
 from glassslam.volume.projection import band_keys, project, top_heights
 from glassslam.volume.projection_kernels import highest, project_leaves
@@ -118,3 +119,12 @@ def test_the_kernels_agree_with_their_twins(cubes, bottom, top):
         over = [z + e for (x, y, z), e in zip(keys, edges, strict=True)
                 if x <= column < x + e and y <= row < y + e]  # fmt: skip
         assert tops[row, column] == max(over, default=-1)
+
+
+def test_a_map_too_large_for_memory_is_refused_before_it_is_made(monkeypatch):
+    monkeypatch.setattr(projection, "MOST_CELLS", 11)
+    with pytest.raises(GridError, match=r"2 x 2 m in voxels of 0\.5 m are too many for a map") as error:
+        project(drawn_tree(["....\n....\n...."]), (0.0, 1.0))
+    assert error.value.hint == "raise volume.resolution"
+    monkeypatch.setattr(projection, "MOST_CELLS", 12)
+    assert project(drawn_tree(["....\n....\n...."]), (0.0, 1.0)).probability.shape == (3, 4)

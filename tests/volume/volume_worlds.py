@@ -87,3 +87,15 @@ def drawing_of(grid):
         return "?" if math.isnan(p) else "#" if p > 0.65 else "." if p < 0.196 else "+"
 
     return ["".join(cell(p) for p in row) for row in grid.probability[::-1].tolist()]
+
+
+def occupied_share(grid, points):
+    """Share of points (n, 2) whose cell or a neighbour is occupied in a map."""
+    filled = grid.probability > 0.65
+    padded = np.pad(filled, 1)
+    grown = np.any([np.roll(padded, (dy, dx), (0, 1)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)], axis=0)[
+        1:-1, 1:-1
+    ]
+    column, row = np.floor((np.asarray(points) - grid.origin) / grid.resolution).astype(int).T
+    inside = (row >= 0) & (row < filled.shape[0]) & (column >= 0) & (column < filled.shape[1])
+    return (grown[row.clip(0, filled.shape[0] - 1), column.clip(0, filled.shape[1] - 1)] & inside).mean()

@@ -1,0 +1,322 @@
+"""Carrying out a run: written down in a working directory, interruptible, taken up where it ended."""
+
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from glassslam.cli.interruption import Bell, Terminated, stopping
+from glassslam.errors import (
+    GlassSlamError,
+    GridError,
+    InterruptedRunError,
+    NoScansError,
+    OutputError,
+    SessionError,
+    UsageError,
+)
+
+if TYPE_CHECKING:
+    from glassslam.config import Config
+    from glassslam.finished import FinishedRun
+    from glassslam.outputs import Stopwatch
+    from glassslam.session import Session
+    from glassslam.sources import Recording, SourceOptions
+
+SUFFIX = ".partial"
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How a command tells of its run.
+
+    Attributes
+    ----------
+    stopwatch : Stopwatch
+        Started with the command.
+    json, quiet : bool
+        Whether the report is printed as JSON; whether nothing is printed.
+    """
+
+    stopwatch: "Stopwatch"
+    json: bool = False
+    quiet: bool = False
+
+
+def begin(
+    recordings: Sequence[Path],
+    target: Path,
+    config: "Config",
+    options: "SourceOptions",
+    *,
+    overwrite: bool,
+    manner: Manner,
+) -> int:
+    """Map recordings into a results directory; the exit code.
+
+    Raises
+    ------
+    UsageError
+        There is a run for that directory which was not finished.
+    InterruptedRunError
+        A signal came; the run can be taken up again.
+    """
+    from glassslam.outputs.directory import restore_results, working_directory  # noqa: PLC0415
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
+    from glassslam.session import SESSION_FILE, Session  # noqa: PLC0415
+    from glassslam.sources import open_recording  # noqa: PLC0415  (loads rosbags)
+
+    with locked(target):
+        restore_results(target)
+        folder = working_directory(target)
+        _make_room(folder, target, overwrite=overwrite)
+        source = open_recording(recordings, options)
+        with _made(folder):
+            session = Session.create(folder / SESSION_FILE, recordings, config, options)
+        with _explained(target), session:
+            try:
+                finished = _slam(source, session, target, manner)
+            except (OutputError, InterruptedRunError):
+                raise
+            except GlassSlamError:  # it would fail again
+                shutil.rmtree(folder)
+                raise
+            return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+
+
+def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -> int:
+    """Go on with a run that did not come to its end; the exit code.
+
+    Parameters
+    ----------
+    directory : Path
+        The results directory named when the run began.
+    recordings : sequence of Path, optional
+        Where its recordings are now; where they were when left out.
+    manner : Manner
+        How to tell of it.
+
+    Raises
+    ------
+    UsageError
+        There is no such run.
+    SessionError
+        Its session or its recordings are not what they were.
+    """
+    from glassslam.outputs.directory import restore_results  # noqa: PLC0415
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
+    from glassslam.session import Session  # noqa: PLC0415
+
+    target = named_target(directory)
+    with locked(target):
+        path = session_path(target)
+        if path.parent == target.resolve():
+            return _already_whole(target, manner)
+        clear_but_session(path.parent)
+        with _explained(target), Session.open(path) as session:
+            finished = session.load() if session.is_finished else _go_on(session, recordings, target, manner)
+            restore_results(target)
+            return conclude(finished, session, target, overwrite=True, manner=manner)
+
+
+def conclude(
+    finished: "FinishedRun", session: "Session", target: Path, *, overwrite: bool, manner: Manner
+) -> int:
+    """Draw a finished run, write its results, and tell of it; the exit code.
+
+    Raises
+    ------
+    OutputError
+        Something cannot be written; the session stays.
+    """
+    from glassslam.cli.settings import calibration_warnings  # noqa: PLC0415
+    from glassslam.outputs import build_report, write_results  # noqa: PLC0415
+
+    result = finished.result()
+    result.statistics.warnings[:0] = calibration_warnings(finished.config)
+    written = write_results(
+        result, target, overwrite=overwrite, stopwatch=manner.stopwatch, session=session
+    )
+    return tell(build_report(result, manner.stopwatch.read()), written, target, manner)
+
+
+def tell(report: dict[str, Any], written: Sequence[Path], target: Path, manner: Manner) -> int:
+    """Print the summary of a run or its report; the exit code."""
+    if manner.json:
+        import json  # noqa: PLC0415  (only for --json)
+
+        from glassslam.cli.terminal import emit  # noqa: PLC0415
+
+        emit(json.dumps({"directory": str(target), **report}, indent=2, allow_nan=False) + "\n")
+    elif not manner.quiet:
+        from glassslam.cli.summary import show_summary  # noqa: PLC0415  (loads rich)
+
+        show_summary(report, written)
+    return 3 if is_damaged(report) else 0
+
+
+def is_damaged(report: dict[str, Any]) -> bool:
+    """Whether anything could not be read, or was dropped that the user did not ask to leave out."""
+    return bool(report["damage"] or report["solver_failures"]) or any(
+        (*report["scans"]["dropped"].values(), *report["messages_dropped"].values())
+    )
+
+
+def named_target(directory: Path) -> Path:
+    """The results directory meant by its own name or by that of its working directory."""
+    return directory.with_name(directory.name.removesuffix(SUFFIX)) if directory.name != SUFFIX else directory
+
+
+def session_path(target: Path) -> Path:
+    """The session of a results directory: that of a run in progress, or else that of the results.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    """
+    from glassslam.outputs.directory import working_directory  # noqa: PLC0415
+    from glassslam.session import SESSION_FILE  # noqa: PLC0415
+
+    for folder in (working_directory(target), target.resolve()):
+        if (folder / SESSION_FILE).is_file():
+            return folder / SESSION_FILE
+    raise UsageError(
+        f"there is no session for {target}", "name the results directory of a run: -o DIR of glassslam map"
+    )
+
+
+def clear_but_session(folder: Path) -> None:
+    """Remove what a partial map or a killed run has left beside the session."""
+    from glassslam.session import SESSION_FILE  # noqa: PLC0415
+
+    for path in folder.iterdir():
+        if not path.name.startswith(SESSION_FILE) or path.name.endswith((".new", ".damaged")):
+            path.unlink()
+
+
+def _make_room(folder: Path, target: Path, *, overwrite: bool) -> None:
+    """Make sure that no earlier run waits to be finished."""
+    from glassslam.session import SESSION_FILE, is_session  # noqa: PLC0415
+
+    if not folder.exists():
+        return
+    if not overwrite and is_session(folder / SESSION_FILE):
+        raise UsageError(
+            f"a run into {target} was interrupted and waits in {folder.name}",
+            f"go on: glassslam map --resume {target}; or begin anew: --overwrite",
+        )
+    foreign = [path.name for path in folder.iterdir() if not path.is_file()]
+    if foreign:
+        raise OutputError(f"{folder} holds what is no result: {foreign[0]}", "choose another directory")
+    shutil.rmtree(folder)
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make a working directory, which stays where the block succeeds."""
+    made = [parent for parent in folder.parents if not parent.exists()]
+    try:
+        folder.mkdir(parents=True)
+        yield
+    except BaseException as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        for parent in made:
+            if parent.is_dir() and not any(parent.iterdir()):
+                parent.rmdir()
+        if isinstance(error, OSError):
+            raise OutputError(f"cannot write {folder}: {error.strerror}") from error
+        raise
+
+
+@contextmanager
+def _explained(target: Path) -> Iterator[None]:
+    """Tell with every end before the end how to go on."""
+    go_on = f"glassslam map --resume {target}"
+    try:
+        yield
+    except OutputError as error:
+        hint = f"{error.hint}; " if error.hint else ""
+        raise OutputError(error.message, f"{hint}then go on: {go_on}") from error
+    except GridError as error:
+        hint = f"{error.hint}; " if error.hint else ""
+        raise GridError(error.message, f"{hint}SLAM is done: glassslam render {target} --set ...") from error
+    except (KeyboardInterrupt, Terminated) as error:
+        code = 130 if isinstance(error, KeyboardInterrupt) else 143
+        raise InterruptedRunError("interrupted", f"go on: {go_on}", code) from error
+
+
+def _go_on(
+    session: "Session", recordings: Sequence[Path] | None, target: Path, manner: Manner
+) -> "FinishedRun":
+    import glassslam  # noqa: PLC0415
+    from glassslam.sources import open_recording  # noqa: PLC0415  (loads rosbags)
+
+    if session.version != glassslam.__version__:
+        raise SessionError(
+            f"glassslam {session.version} has begun this run, and this is {glassslam.__version__}:"
+            " the result would be of both",
+            "map the recording anew, with --overwrite",
+        )
+    source = open_recording([*map(Path, session.check_recordings(recordings))], session.options)
+    return _slam(source, session, target, manner)
+
+
+def _slam(source: "Recording", session: "Session", target: Path, manner: Manner) -> "FinishedRun":
+    """SLAM to the end of the recording.
+
+    Raises
+    ------
+    InterruptedRunError
+        A signal came; what there was of the map is written.
+    """
+    from glassslam.api import RunInProgress  # noqa: PLC0415  (loads numba and casadi)
+    from glassslam.cli.progress import progress_bar  # noqa: PLC0415
+
+    names = [recorded.given for recorded in session.recordings]
+    with progress_bar(quiet=manner.quiet) as progress:
+        run = RunInProgress(source, session.config, progress=progress, session=session, names=names)
+        with stopping(run.hurry) as bell:
+            try:
+                finished = run.finished()
+            except NoScansError as error:
+                if not bell.rung:
+                    raise
+                session.close()
+                raise _interruption(run, bell, target, "before there was a map") from error
+            if finished.is_whole:
+                return finished
+            session.close()
+            _write_partial(finished, session.path.parent, run, manner)
+    raise _interruption(run, bell, target, f"a map of them is in {session.path.parent.name}")
+
+
+def _write_partial(finished: "FinishedRun", folder: Path, run: Any, manner: Manner) -> None:
+    from glassslam.outputs.results import write_files  # noqa: PLC0415
+
+    result = finished.result()
+    result.statistics.warnings.insert(
+        0, f"interrupted after {run.scans} scans, {run.recorded_seconds:.1f} s: the rest is not in this map"
+    )
+    try:
+        write_files(result, folder, manner.stopwatch)
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {error.strerror}", "free some space") from error
+
+
+def _interruption(run: Any, bell: Bell, target: Path, what: str) -> InterruptedRunError:
+    return InterruptedRunError(
+        f"interrupted after {run.scans} scans, {run.recorded_seconds:.1f} s; {what}",
+        f"go on: glassslam map --resume {target}",
+        bell.exit_code,
+    )
+
+
+def _already_whole(target: Path, manner: Manner) -> int:
+    from glassslam.cli.terminal import emit  # noqa: PLC0415
+
+    if not manner.quiet:
+        emit(f"{target} is whole: there is nothing to go on with\n")
+    return 0

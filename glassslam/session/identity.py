@@ -1,0 +1,82 @@
+"""How a recording is known again: by its size and by a digest of its content."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+_BLOCK = 1 << 18
+_BLOCKS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A file or directory that a run reads.
+
+    Attributes
+    ----------
+    given : str
+        Its path as the user named it.
+    path : str
+        The same, absolute and without symbolic links.
+    digest : str
+        Of its size and content.
+    """
+
+    given: str
+    path: str
+    digest: str
+
+    def found(self) -> str:
+        """Where it is now: as named, if that still leads there."""
+        return self.given if str(Path(self.given).resolve()) == self.path else self.path
+
+
+def identify(path: str | Path) -> Recorded:
+    """Look at a recording.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or a directory of files.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    return Recorded(str(path), str(Path(path).resolve()), digest(path))
+
+
+def digest(path: str | Path) -> str:
+    """Digest of size and content: whole up to 16 MB, beyond that of 64 blocks spread evenly.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    total = hashlib.blake2b(digest_size=20)
+    for file in _files(Path(path)):
+        size = file.stat().st_size
+        total.update(f"{file.name} {size}\n".encode(errors="surrogateescape"))
+        for block in _blocks(file, size):
+            total.update(block)
+    return total.hexdigest()
+
+
+def _files(path: Path) -> Sequence[Path]:
+    if not path.is_dir():
+        return [path]
+    # what a database keeps beside it while it is read is no part of a recording
+    return sorted(file for file in path.iterdir() if file.is_file() and not file.name.endswith("-shm"))
+
+
+def _blocks(file: Path, size: int) -> Iterator[bytes]:
+    with file.open("rb") as stream:
+        if size <= _BLOCK * _BLOCKS:
+            yield from iter(lambda: stream.read(_BLOCK), b"")
+            return
+        for k in range(_BLOCKS):
+            stream.seek((size - _BLOCK) * k // (_BLOCKS - 1))
+            yield stream.read(_BLOCK)

@@ -1,0 +1,100 @@
+"""The journal of a run in its session file."""
+
+import sqlite3
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from glassslam.session.database import explained
+from glassslam.session.rows import closure_of, node_row, scan_outcome, scan_row, search_row
+from glassslam.session.schema import insertion, transaction
+from glassslam.slam.closure import Closure
+from glassslam.slam.journal import ScanOutcome
+from glassslam.slam.node import Node
+
+_SECONDS_BETWEEN_COMMITS = 1.0
+_TABLES = ("scans", "nodes", "rounds", "searches")
+
+
+class SessionJournal:
+    """Reads what is known of a run, then adds what is new, about once a second.
+
+    Whatever is written is a beginning of the run: rows are added in the order of the run, and those of one
+    moment in one transaction.
+
+    Parameters
+    ----------
+    database : sqlite3.Connection
+        The session.
+    path : Path
+        Its file, for errors.
+    seconds : float
+        Time between two commits, s.
+    clock : callable
+        Tells the time, s.
+    """
+
+    def __init__(
+        self,
+        database: sqlite3.Connection,
+        path: Path,
+        seconds: float = _SECONDS_BETWEEN_COMMITS,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._database, self._path = database, path
+        self._seconds, self._clock = seconds, clock
+        self._known = database.execute("SELECT * FROM scans ORDER BY number")
+        self._known_rounds = database.execute("SELECT * FROM rounds ORDER BY number")
+        self.scans, self._nodes, self._rounds, self._searches = (
+            database.execute(f"SELECT count(*) FROM {table}").fetchone()[0]  # noqa: S608  (own names only)
+            for table in _TABLES
+        )
+        self._new: dict[str, list[tuple[Any, ...]]] = {table: [] for table in _TABLES}
+        self._due = clock() + seconds
+
+    def recall_scan(self) -> ScanOutcome | None:
+        """What became of the next scan; None past the end of what is known."""
+        row = self._known.fetchone()
+        return None if row is None else scan_outcome(row)
+
+    def keep_scan(self, stamp: float, outcome: ScanOutcome, node: Node | None) -> None:
+        """Write down what became of a scan, and the node it became."""
+        self._new["scans"].append(scan_row(self.scans, stamp, outcome))
+        self.scans += 1
+        if node is not None:
+            self._new["nodes"].append(node_row(node))
+        if self._clock() >= self._due:
+            self.flush()
+
+    def recall_round(self) -> list[Closure] | None:
+        """What the next round of searches found; None past the end of what is known."""
+        row = self._known_rounds.fetchone()
+        if row is None:
+            return None
+        found = self._database.execute("SELECT * FROM searches WHERE round = ? ORDER BY number", (row[0],))
+        return [closure_of(search) for search in found]
+
+    def keep_round(self, closures: Sequence[Closure]) -> None:
+        """Write down what a round of searches found."""
+        self._new["rounds"].append((self._rounds, len(closures)))
+        self._new["searches"] += [
+            search_row(self._searches + k, self._rounds, closure) for k, closure in enumerate(closures)
+        ]
+        self._rounds += 1
+        self._searches += len(closures)
+
+    def flush(self) -> None:
+        """Commit what is new.
+
+        Raises
+        ------
+        OutputError
+            The disk is full; what was committed before stays.
+        """
+        with explained(self._path), transaction(self._database):
+            for table, rows in self._new.items():
+                self._database.executemany(insertion(table), rows)
+        for rows in self._new.values():
+            rows.clear()
+        self._due = self._clock() + self._seconds

@@ -1,0 +1,278 @@
+"""The session of a run: one file that holds all it needs to be taken up, and all that is drawn from it."""
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final, Self
+
+from glassslam.config import Config
+from glassslam.errors import SessionError
+from glassslam.finished import FinishedRun
+from glassslam.session.database import create, damaged, explained, open_existing, write_compact
+from glassslam.session.identity import Recorded, digest, identify
+from glassslam.session.journal import SessionJournal
+from glassslam.session.schema import transaction
+from glassslam.session.store import load_finished, read_facts, save_finished, tupled, write_facts
+from glassslam.sources import SourceOptions
+from glassslam.yamltext import parse_yaml
+
+SESSION_FILE: Final = "session.db"
+_ASIDE = ("-wal", "-shm", "-journal")
+
+
+class Session:
+    """A session file that is open; no other process can open it meanwhile.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    config : Config
+        The resolved configuration.
+    options : SourceOptions
+        Which part of the recordings is read, and how.
+    recordings : tuple of Recorded
+        The recordings, in their order.
+    journal : SessionJournal
+        What is known of the run, and where the rest is written down.
+
+    Examples
+    --------
+    >>> import glassslam as gs
+    >>> with gs.Session.create("run.db", ["run.bag"]) as session:  # doctest: +SKIP
+    ...     result = gs.map_recording("run.bag", session=session)
+    """
+
+    def __init__(self, path: Path, database: Any) -> None:
+        self.path, self._database, self._is_closed = path, database, False
+        with explained(path):
+            self._facts = read_facts(database)
+            try:
+                self.config = Config.from_mapping(parse_yaml(self._facts["config"]), str(path))
+                self.recordings = tuple(Recorded(**known) for known in self._facts["recordings"])
+                self._sonar = self._facts["sonar"] and Recorded(**self._facts["sonar"])
+                self.options = _options(self._facts["options"], self._sonar)
+            except (KeyError, TypeError) as error:
+                raise damaged(path, f"it does not tell the recording ({error})") from error
+            self.journal = SessionJournal(database, path)
+
+    @classmethod
+    def create(
+        cls,
+        path: str | Path,
+        recordings: Sequence[str | Path],
+        config: Config | None = None,
+        options: SourceOptions | None = None,
+    ) -> Self:
+        """Begin a session in a new file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; it must not exist.
+        recordings : sequence of str or Path
+            The recordings, in their order.
+        config : Config, optional
+            Parameters; the defaults when left out.
+        options : SourceOptions, optional
+            Topics, extrinsics and the part of the recording to use.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written.
+        OSError
+            A recording cannot be read.
+        """
+        options = options or SourceOptions()
+        facts = {
+            "glassslam": metadata.version("glassslam"),
+            "config": (config or Config()).dump(),
+            "recordings": [asdict(identify(recording)) for recording in recordings],
+            "sonar": None if options.sonar is None else asdict(identify(options.sonar)),
+            "options": {**asdict(options), "sonar": None, "sonar_ring": _text(options.sonar_ring)},
+        }
+        path = Path(path)
+        return cls(path, create(path, lambda database: write_facts(database, facts)))
+
+    @classmethod
+    def open(cls, path: str | Path) -> Self:
+        """Open a session, whether its run is finished or not.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; a file of an earlier version is brought to the present one.
+
+        Raises
+        ------
+        SessionError
+            There is none, or it is of another program, of a newer version, or damaged.
+        """
+        return cls(Path(path), open_existing(Path(path)))
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the run came to its end."""
+        return "is_whole" in self._facts
+
+    @property
+    def version(self) -> str:
+        """The version of glassslam that has begun the run."""
+        return str(self._facts["glassslam"])
+
+    def check_recordings(self, recordings: Sequence[str | Path] | None = None) -> list[str]:
+        """Paths to read the recordings from, when they are the same as ever.
+
+        Parameters
+        ----------
+        recordings : sequence of str or Path, optional
+            Where they are now; where they were when left out.
+
+        Raises
+        ------
+        SessionError
+            One is missing, has changed, or was written by another version.
+        """
+        now = [known.found() for known in self.recordings] if recordings is None else [*map(str, recordings)]
+        if len(now) != len(self.recordings):
+            raise SessionError(
+                f"the run reads {len(self.recordings)} recordings, not {len(now)}", "name all, in their order"
+            )
+        pairs = [*zip(now, self.recordings, strict=True)]
+        if self._sonar is not None:
+            pairs.append((self._sonar.found(), self._sonar))
+        for path, known in pairs:
+            _check_same(path, known)
+        return now
+
+    def copy(self, path: Path, config: Config) -> "Session":
+        """A copy of this session in a new file, for a run with another configuration.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written.
+        """
+        write_compact(self._database, self.path, path)
+        database = open_existing(path)
+        with explained(path), transaction(database):
+            write_facts(database, {"config": config.dump()})
+        return type(self)(path, database)
+
+    def save(self, run: FinishedRun) -> None:
+        """Write down everything about a finished run.
+
+        Raises
+        ------
+        OutputError
+            The disk is full.
+        """
+        self.journal.flush()
+        with explained(self.path), transaction(self._database):
+            write_facts(self._database, {"config": run.config.dump()})
+            save_finished(self._database, run)
+            self._facts = read_facts(self._database)
+        self.config = run.config
+
+    def load(self) -> FinishedRun:
+        """The finished run.
+
+        Raises
+        ------
+        SessionError
+            The run is not finished, or the file is damaged.
+        """
+        if not self.is_finished:
+            raise SessionError(f"the run of {self.path} is not finished", "go on with glassslam map --resume")
+        with explained(self.path):
+            try:
+                return load_finished(self._database, self.config)
+            except (KeyError, ValueError, TypeError, IndexError) as error:
+                raise damaged(self.path, f"{type(error).__name__} {error}") from error
+
+    def settle_in(self, folder: Path) -> Path:
+        """Close the session and leave it in a folder, the same bytes for the same run however it came about.
+
+        Parameters
+        ----------
+        folder : Path
+            Where it shall be; its own folder or another one.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            It cannot be written; the session is then open as before.
+        """
+        settled, compact = folder / SESSION_FILE, folder / f"{SESSION_FILE}.new"
+        write_compact(self._database, self.path, compact)
+        self.abandon()
+        if settled == self.path:
+            remove_logs(self.path)
+        os.replace(compact, settled)  # noqa: PTH105  (tests make exactly this call fail)
+        return settled
+
+    def close(self) -> None:
+        """Write what is left and close the file; a file that is closed stays so.
+
+        Raises
+        ------
+        OutputError
+            The disk is full.
+        """
+        if not self._is_closed:
+            self.journal.flush()
+            self.abandon()
+
+    def abandon(self) -> None:
+        """Close the file without writing anything more."""
+        self._is_closed = True
+        self._database.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abandon()
+
+
+def remove_logs(path: Path) -> None:
+    """Remove what the database keeps beside a session that is closed: nothing is left to be read from it."""
+    for ending in _ASIDE:
+        with suppress(FileNotFoundError):
+            path.with_name(f"{path.name}{ending}").unlink()
+
+
+def _options(values: dict[str, Any], sonar: Recorded | None) -> SourceOptions:
+    given: dict[str, Any] = {name: tupled(value) for name, value in values.items()}
+    given["sonar"] = None if sonar is None else sonar.found()
+    return SourceOptions(**given)
+
+
+def _text(value: str | Path | None) -> str | None:
+    """An option that may be a name or a file: files by their whole path, which leads there from anywhere."""
+    if value is None or not Path(value).is_file():
+        return None if value is None else str(value)
+    return str(Path(value).resolve())
+
+
+def _check_same(path: str, known: Recorded) -> None:
+    try:
+        same = digest(path) == known.digest
+    except OSError as error:
+        raise SessionError(
+            f"cannot read {path}: {error.strerror}", "name the recording where it is now, before --resume"
+        ) from error
+    if not same:
+        raise SessionError(f"{path} is not the recording the run has read", "map it anew")

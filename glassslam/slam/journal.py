@@ -1,0 +1,71 @@
+"""What a run writes down on its way, so that it can be taken up where it ended.
+
+Two steps of a run are costly: matching a scan, and searching for loop closures. Their outcomes are written
+down in the order they come. A run that is taken up again reads the recording from the start and does
+everything else once more, with these outcomes instead of the two steps; so it arrives at the very state of
+before, bit by bit, whatever that state consists of, and goes on from there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from glassslam.slam.closure import Closure
+from glassslam.slam.node import Node
+from glassslam.slam.tracking import Match, Tracking
+
+
+@dataclass(frozen=True, slots=True)
+class ScanOutcome:
+    """What became of one scan.
+
+    Attributes
+    ----------
+    match : Match
+        Where it fits.
+    tracking : Tracking
+        What matching carries on to the next scan.
+    returns : int
+        Its returns after thinning.
+    is_node : bool
+        Whether it became a node.
+    """
+
+    match: Match
+    tracking: Tracking
+    returns: int
+    is_node: bool
+
+
+class Journal(Protocol):
+    """Outcomes of the costly steps of a run, in their order."""
+
+    def recall_scan(self) -> ScanOutcome | None:
+        """What became of the next scan; None past the end of what is known."""
+
+    def keep_scan(self, stamp: float, outcome: ScanOutcome, node: Node | None) -> None:
+        """Write down what became of a scan, and the node it became."""
+
+    def recall_round(self) -> list[Closure] | None:
+        """What the next round of searches found; None past the end of what is known."""
+
+    def keep_round(self, closures: Sequence[Closure]) -> None:
+        """Write down what a round of searches found."""
+
+
+class NoJournal:
+    """Knows nothing and writes nothing down."""
+
+    def recall_scan(self) -> ScanOutcome | None:
+        """Nothing."""
+        return None
+
+    def keep_scan(self, stamp: float, outcome: ScanOutcome, node: Node | None) -> None:
+        """Do nothing."""
+
+    def recall_round(self) -> list[Closure] | None:
+        """Nothing."""
+        return None
+
+    def keep_round(self, closures: Sequence[Closure]) -> None:
+        """Do nothing."""
