@@ -22,6 +22,8 @@ from glassslam.errors import GlassSlamError, UsageError
 # name -> (module, function, summary). The summaries stand here so that --help loads no command.
 COMMANDS = {
     "map": ("glassslam.cli.map", "map_command", "Make a map from a recording."),
+    "render": ("glassslam.cli.render", "render", "Draw the results of a run again, without SLAM."),
+    "recover": ("glassslam.cli.recover", "recover", "Save what is left of a damaged session."),
     "inspect": ("glassslam.cli.inspect", "inspect", "Show what is in a recording and what map would use."),
     "calibrate": ("glassslam.cli.calibrate", "calibrate_command", "Calibrate a lidar for glass."),
     "evaluate": ("glassslam.cli.evaluate", "evaluate", "Compare a trajectory with the truth."),
@@ -36,6 +38,7 @@ Examples:
   glassslam demo                               simulate a building and map it
   glassslam inspect run.bag                    what is in the recording?
   glassslam map run.bag -o run-map             make the map
+  glassslam render run-map --set map.resolution=0.02
   glassslam evaluate run-map --relations F     how good is it?
   glassslam map --help                         all options of a command
 

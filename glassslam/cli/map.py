@@ -1,7 +1,7 @@
 """`glassslam map`: make a map from a recording."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -151,7 +151,7 @@ def map_command(
         refuse_others(
             output, config, assignments, sensor, calibration, require_intensity, overwrite, scan_topic,
             odom_topic, imu_topic, sonar, sonar_topic, points_topic, sonar_ring, laser_pose, start, duration,
-            strict,
+            strict, every != 1, echo != "first",
         )  # fmt: skip
         return go_on(resume, recordings, manner)
     if not recordings:

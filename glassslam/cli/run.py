@@ -71,11 +71,11 @@ def begin(
     with locked(target):
         restore_results(target)
         folder = working_directory(target)
-        _make_room(folder, target, overwrite=overwrite)
+        make_room(folder, target, overwrite=overwrite)
         source = open_recording(recordings, options)
-        with _made(folder):
+        with made_directory(folder):
             session = Session.create(folder / SESSION_FILE, recordings, config, options)
-        with _explained(target), session:
+        with explained_end(target), session:
             try:
                 finished = _slam(source, session, target, manner)
             except (OutputError, InterruptedRunError):
@@ -83,7 +83,11 @@ def begin(
             except GlassSlamError:  # it would fail again
                 shutil.rmtree(folder)
                 raise
-            return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+            try:
+                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+            except GridError as error:
+                hint = f"{error.hint}; poses are kept: glassslam render {target} --set ..."
+                raise GridError(error.message, hint) from error
 
 
 def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -> int:
@@ -113,10 +117,13 @@ def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -
     with locked(target):
         path = session_path(target)
         if path.parent == target.resolve():
+            restore_results(target)
             return _already_whole(target, manner)
         clear_but_session(path.parent)
-        with _explained(target), Session.open(path) as session:
-            finished = session.load() if session.is_finished else _go_on(session, recordings, target, manner)
+        with explained_end(target), Session.open(path) as session:
+            finished = (
+                session.load() if session.is_finished else go_on_with(session, recordings, target, manner)
+            )
             restore_results(target)
             return conclude(finished, session, target, overwrite=True, manner=manner)
 
@@ -136,9 +143,7 @@ def conclude(
 
     result = finished.result()
     result.statistics.warnings[:0] = calibration_warnings(finished.config)
-    written = write_results(
-        result, target, overwrite=overwrite, stopwatch=manner.stopwatch, session=session
-    )
+    written = write_results(result, target, overwrite=overwrite, stopwatch=manner.stopwatch, session=session)
     return tell(build_report(result, manner.stopwatch.read()), written, target, manner)
 
 
@@ -192,12 +197,13 @@ def clear_but_session(folder: Path) -> None:
     """Remove what a partial map or a killed run has left beside the session."""
     from glassslam.session import SESSION_FILE  # noqa: PLC0415
 
+    kept = {f"{SESSION_FILE}{ending}" for ending in ("", "-wal", "-shm", "-journal")}
     for path in folder.iterdir():
-        if not path.name.startswith(SESSION_FILE) or path.name.endswith((".new", ".damaged")):
+        if path.name not in kept:
             path.unlink()
 
 
-def _make_room(folder: Path, target: Path, *, overwrite: bool) -> None:
+def make_room(folder: Path, target: Path, *, overwrite: bool) -> None:
     """Make sure that no earlier run waits to be finished."""
     from glassslam.session import SESSION_FILE, is_session  # noqa: PLC0415
 
@@ -215,7 +221,7 @@ def _make_room(folder: Path, target: Path, *, overwrite: bool) -> None:
 
 
 @contextmanager
-def _made(folder: Path) -> Iterator[None]:
+def made_directory(folder: Path) -> Iterator[None]:
     """Make a working directory, which stays where the block succeeds."""
     made = [parent for parent in folder.parents if not parent.exists()]
     try:
@@ -232,7 +238,7 @@ def _made(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _explained(target: Path) -> Iterator[None]:
+def explained_end(target: Path) -> Iterator[None]:
     """Tell with every end before the end how to go on."""
     go_on = f"glassslam map --resume {target}"
     try:
@@ -240,17 +246,23 @@ def _explained(target: Path) -> Iterator[None]:
     except OutputError as error:
         hint = f"{error.hint}; " if error.hint else ""
         raise OutputError(error.message, f"{hint}then go on: {go_on}") from error
-    except GridError as error:
-        hint = f"{error.hint}; " if error.hint else ""
-        raise GridError(error.message, f"{hint}SLAM is done: glassslam render {target} --set ...") from error
     except (KeyboardInterrupt, Terminated) as error:
         code = 130 if isinstance(error, KeyboardInterrupt) else 143
         raise InterruptedRunError("interrupted", f"go on: {go_on}", code) from error
 
 
-def _go_on(
+def go_on_with(
     session: "Session", recordings: Sequence[Path] | None, target: Path, manner: Manner
 ) -> "FinishedRun":
+    """Read the recordings of a session from the start, with what it knows, and on to their end.
+
+    Raises
+    ------
+    SessionError
+        The recordings are not what they were, or another version has begun the run.
+    InterruptedRunError
+        A signal came.
+    """
     import glassslam  # noqa: PLC0415
     from glassslam.sources import open_recording  # noqa: PLC0415  (loads rosbags)
 

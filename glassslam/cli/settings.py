@@ -27,7 +27,24 @@ def resolve_config(file: Path | None, assignments: Sequence[str]) -> Config:
     ConfigError
         An assignment has another form, or a name or value is refused.
     """
-    config = Config.load(file) if file else Config()
+    return assigned(Config.load(file) if file else Config(), assignments)
+
+
+def assigned(config: Config, assignments: Sequence[str]) -> Config:
+    """A configuration with single values replaced.
+
+    Parameters
+    ----------
+    config : Config
+        The configuration.
+    assignments : sequence of str
+        "section.name=value", the value as in YAML.
+
+    Raises
+    ------
+    ConfigError
+        An assignment has another form, or a name or value is refused.
+    """
     if not assignments:
         return config
     data = config.model_dump(mode="json")

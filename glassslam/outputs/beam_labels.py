@@ -10,6 +10,8 @@ from glassslam.errors import GlassSlamError, OutputError
 from glassslam.glass.beam_labels import GlassBeams
 
 _COLUMNS = {"stamps": np.float64, "scan": np.int64, "beam": np.int32, "count": np.int32, "label": np.uint8}
+MOST_BYTES = 2 << 30
+"""More than the labels of any recording: an archive may claim to hold anything."""
 
 
 def write_beam_labels(beams: GlassBeams, path: Path) -> Path:
@@ -59,13 +61,18 @@ def read_arrays(
     Raises
     ------
     GlassSlamError
-        Of that kind: the file cannot be read, is no npz, or lacks an array.
+        Of that kind: the file cannot be read, is no npz, would fill the memory, or lacks an array.
     """
     try:
         with Path(path).open("rb") as file:
             content = np.load(file, allow_pickle=False)
             known = content.files if isinstance(content, np.lib.npyio.NpzFile) else None
+            size = sum(member.file_size for member in content.zip.infolist()) if known else 0
+            if size > MOST_BYTES:
+                raise kind(f"{path} would unpack to {size / 1e9:.1f} GB", hint)
             arrays = {name: content[name] for name in (*names, *optional) if known and name in known}
+    except GlassSlamError:
+        raise
     except OSError as error:
         raise kind(f"cannot read {path}: {error.strerror or 'damaged'}", hint) from error
     except Exception as error:

@@ -176,9 +176,16 @@ def working_directory(directory: str | Path) -> Path:
 
 
 def restore_results(directory: str | Path) -> None:
-    """Put earlier results back that a run was about to replace in the moment it was killed."""
+    """Put earlier results back that a run was about to replace in the moment it was killed.
+
+    Where it had replaced them already, they are removed as the run would have done.
+    """
     target = Path(directory).resolve()
-    if not target.exists() and _retired(target).is_dir():
+    if not _retired(target).is_dir():
+        return
+    if target.exists():
+        shutil.rmtree(_retired(target), ignore_errors=True)
+    else:
         _retired(target).rename(target)
 
 

@@ -10,6 +10,7 @@ from glassslam.session import schema
 
 _MAGIC = b"SQLite format 3\0"
 _HEADER_BYTES = 100
+_ONE = (1).to_bytes(4, "big")
 _PLACES = (60, 68)  # of the user version and the application id: the file format of SQLite
 
 _FULL = ("database or disk is full", "disk I/O error", "unable to open database", "readonly database")
@@ -41,6 +42,10 @@ def damaged(path: Path, why: str) -> SessionError:
     """The error of a file that holds no whole session any more."""
     folder = path.parent.name.removesuffix(".partial")
     return SessionError(f"{path} is damaged: {why}", f"save what there is: glassslam recover {folder}")
+
+
+def _begun(path: Path) -> SessionError:
+    return SessionError(f"{path} is empty: the run ended as it began", "map the recording again")
 
 
 def create(path: Path, fill: Callable[[sqlite3.Connection], None]) -> sqlite3.Connection:
@@ -80,13 +85,42 @@ def open_existing(path: Path) -> sqlite3.Connection:
     check_header(path)
     with explained(path):
         database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-        _set_up(database)
-        schema.migrate(database)
-        known = {row[0] for row in database.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
-    if missing := sorted(schema.TABLES.keys() - known):
-        database.close()
-        raise damaged(path, f"it has no table {missing[0]!r}")
+        try:
+            # a process that ends while it makes a session leaves one that is undone when it is opened
+            if database.execute("PRAGMA user_version").fetchone()[0] < 1:
+                raise _begun(path)
+            _set_up(database)
+            _bring_up(database, path)
+        except BaseException:
+            database.close()
+            raise
     return database
+
+
+def _bring_up(database: sqlite3.Connection, path: Path) -> None:
+    """Make a database of any version one of this version, with all its tables."""
+    schema.migrate(database)
+    known = {row[0] for row in database.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+    if missing := sorted(schema.TABLES.keys() - known):
+        raise damaged(path, f"it has no table {missing[0]!r}")
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[sqlite3.Connection]:
+    """An existing session file, of any version, that is not changed.
+
+    Raises
+    ------
+    SessionError
+        There is none, it is no session, a newer one, or damaged.
+    """
+    check_header(path)
+    with explained(path):
+        database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, isolation_level=None)
+    try:
+        yield database
+    finally:
+        database.close()
 
 
 def check_header(path: Path) -> None:
@@ -103,8 +137,12 @@ def check_header(path: Path) -> None:
         raise SessionError(f"there is no session {path}", "it is written by glassslam map") from error
     except OSError as error:
         raise SessionError(f"cannot read {path}: {error.strerror}") from error
+    if not head:
+        raise _begun(path)
     if not head.startswith(_MAGIC):
-        raise SessionError(f"{path} is no session of glassslam")
+        raise SessionError(
+            f"{path} is no session of glassslam", "if it was one that is damaged: glassslam recover"
+        )
     if len(head) < _HEADER_BYTES:
         raise damaged(path, "it is cut off")
     version, application = _numbers(head)
@@ -144,6 +182,18 @@ def _numbers(head: bytes) -> tuple[int, int]:
     return version, application
 
 
+def complete_file(database: sqlite3.Connection, path: Path) -> None:
+    """Bring everything from the log into the file of a session, so that nothing is lost without the log.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    with explained(path):
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+
+
 def write_compact(database: sqlite3.Connection, path: Path, target: Path) -> None:
     """Write the content of a session to a new file, the same bytes for the same content.
 
@@ -156,3 +206,8 @@ def write_compact(database: sqlite3.Connection, path: Path, target: Path) -> Non
         target.unlink()
     with explained(path):
         database.execute("VACUUM INTO ?", (str(target),))
+    # what the header tells of the way of the file: logs, changes, tables made, changes again
+    with target.open("r+b") as file:
+        for place, value in ((18, b"\1\1"), (24, _ONE), (40, _ONE), (92, _ONE)):
+            file.seek(place)
+            file.write(value)

@@ -51,15 +51,17 @@ def identify(path: str | Path) -> Recorded:
 def digest(path: str | Path) -> str:
     """Digest of size and content: whole up to 16 MB, beyond that of 64 blocks spread evenly.
 
+    Names count within a directory only, where one file may refer to another.
+
     Raises
     ------
     OSError
         It cannot be read.
     """
-    total = hashlib.blake2b(digest_size=20)
-    for file in _files(Path(path)):
-        size = file.stat().st_size
-        total.update(f"{file.name} {size}\n".encode(errors="surrogateescape"))
+    total, folder = hashlib.blake2b(digest_size=20), Path(path)
+    for file in _files(folder):
+        size, name = file.stat().st_size, "" if file == folder else file.name
+        total.update(f"{name} {size}\n".encode(errors="surrogateescape"))
         for block in _blocks(file, size):
             total.update(block)
     return total.hexdigest()

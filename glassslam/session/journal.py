@@ -1,14 +1,16 @@
 """The journal of a run in its session file."""
 
 import sqlite3
+import struct
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from glassslam.session.database import explained
+from glassslam.session.database import damaged, explained
 from glassslam.session.rows import closure_of, node_row, scan_outcome, scan_row, search_row
-from glassslam.session.schema import insertion, transaction
+from glassslam.session.schema import insert, transaction, unsealed
 from glassslam.slam.closure import Closure
 from glassslam.slam.journal import ScanOutcome
 from glassslam.slam.node import Node
@@ -44,19 +46,33 @@ class SessionJournal:
     ) -> None:
         self._database, self._path = database, path
         self._seconds, self._clock = seconds, clock
-        self._known = database.execute("SELECT * FROM scans ORDER BY number")
-        self._known_rounds = database.execute("SELECT * FROM rounds ORDER BY number")
+        self._recalled = self._recalled_nodes = self._recalled_rounds = self._recalled_searches = 0
         self.scans, self._nodes, self._rounds, self._searches = (
             database.execute(f"SELECT count(*) FROM {table}").fetchone()[0]  # noqa: S608  (own names only)
             for table in _TABLES
         )
+        self._known, self._known_rounds = self.scans, self._rounds
         self._new: dict[str, list[tuple[Any, ...]]] = {table: [] for table in _TABLES}
         self._due = clock() + seconds
 
     def recall_scan(self) -> ScanOutcome | None:
-        """What became of the next scan; None past the end of what is known."""
-        row = self._known.fetchone()
-        return None if row is None else scan_outcome(row)
+        """What became of the next scan; None past the end of what is known.
+
+        Raises
+        ------
+        SessionError
+            It cannot be read any more.
+        """
+        if self._recalled == self._known:
+            return None
+        row, self._recalled = self._row("scans", self._recalled), self._recalled + 1
+        with self._sensible():
+            outcome = scan_outcome(row)
+        if outcome.is_node:
+            # nothing of it is needed now, but the session of the finished run will hold it
+            self._row("nodes", self._recalled_nodes)
+            self._recalled_nodes += 1
+        return outcome
 
     def keep_scan(self, stamp: float, outcome: ScanOutcome, node: Node | None) -> None:
         """Write down what became of a scan, and the node it became."""
@@ -68,12 +84,21 @@ class SessionJournal:
             self.flush()
 
     def recall_round(self) -> list[Closure] | None:
-        """What the next round of searches found; None past the end of what is known."""
-        row = self._known_rounds.fetchone()
-        if row is None:
+        """What the next round of searches found; None past the end of what is known.
+
+        Raises
+        ------
+        SessionError
+            It cannot be read any more.
+        """
+        if self._recalled_rounds == self._known_rounds:
             return None
-        found = self._database.execute("SELECT * FROM searches WHERE round = ? ORDER BY number", (row[0],))
-        return [closure_of(search) for search in found]
+        _, count = self._row("rounds", self._recalled_rounds)
+        self._recalled_rounds += 1
+        first = self._recalled_searches
+        self._recalled_searches += count
+        with self._sensible():
+            return [closure_of(self._row("searches", first + k)) for k in range(count)]
 
     def keep_round(self, closures: Sequence[Closure]) -> None:
         """Write down what a round of searches found."""
@@ -94,7 +119,26 @@ class SessionJournal:
         """
         with explained(self._path), transaction(self._database):
             for table, rows in self._new.items():
-                self._database.executemany(insertion(table), rows)
+                insert(self._database, table, rows)
         for rows in self._new.values():
             rows.clear()
         self._due = self._clock() + self._seconds
+
+    def _row(self, table: str, number: int) -> tuple[Any, ...]:
+        # no statement stays open: beside one the database refuses to be copied
+        with explained(self._path):
+            row: tuple[Any, ...] | None = self._database.execute(
+                f"SELECT * FROM {table} WHERE number = ?",  # noqa: S608  (own names only)
+                (number,),
+            ).fetchone()
+        if row is None:
+            raise damaged(self._path, f"row {number} of {table!r} is missing")
+        with self._sensible():
+            return unsealed(row)
+
+    @contextmanager
+    def _sensible(self) -> Iterator[None]:
+        try:
+            yield
+        except (ValueError, TypeError, struct.error) as error:
+            raise damaged(self._path, f"{type(error).__name__} {error}") from error

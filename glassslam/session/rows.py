@@ -1,5 +1,7 @@
 """Outcomes of a run as rows of the tables, and back, bit by bit."""
 
+import math
+import struct
 from collections.abc import Sequence
 from dataclasses import astuple
 from typing import Any
@@ -14,14 +16,16 @@ from glassslam.slam.tracking import Event, How, Match, Tracking
 
 Row = Sequence[Any]
 
+_DOUBLE = struct.Struct("<d")
+
 
 def scan_row(number: int, stamp: float, outcome: ScanOutcome) -> tuple[Any, ...]:
     """Row of `scans`."""
-    match, now = outcome.match, outcome.tracking
+    match, (usual, *counts) = outcome.match, astuple(outcome.tracking)
     return (
-        number, float(stamp), *match.pose.tolist(), float(match.residual), int(match.points),
-        float(match.hold), float(match.free_heading), float(match.overlap), int(match.how), int(match.event),
-        int(match.doubtful), int(outcome.returns), int(outcome.is_node), *map(_plain, astuple(now)),
+        number, *map(_kept, (stamp, *match.pose, match.residual)), int(match.points),
+        *map(_kept, (match.hold, match.free_heading, match.overlap)), int(match.how), int(match.event),
+        int(match.doubtful), int(outcome.returns), int(outcome.is_node), _kept(usual), *map(int, counts),
     )  # fmt: skip
 
 
@@ -30,18 +34,23 @@ def scan_outcome(row: Row) -> ScanOutcome:
     x, y, theta, residual, points, hold, heading, overlap, how, event, doubtful, returns, is_node = row[2:15]
     usual, since_gap, since_start, in_doubt, *counts = row[15:]
     match = Match(
-        np.array([x, y, theta], dtype=np.float64), _number(residual), points, _number(hold), _number(heading),
+        np.array([*map(_number, (x, y, theta))]), _number(residual), points, _number(hold), _number(heading),
         _number(overlap), How(how), Event(event), bool(doubtful),
     )  # fmt: skip
     tracking = Tracking(_number(usual), since_gap, since_start, bool(in_doubt), *counts)
     return ScanOutcome(match, tracking, returns, bool(is_node))
 
 
+def scan_stamps(rows: Sequence[Row]) -> FloatArray:
+    """Stamps of rows of `scans`, s, shape (n,)."""
+    return np.array([_number(row[1]) for row in rows])
+
+
 def node_row(node: Node) -> tuple[Any, ...]:
     """Row of `nodes`."""
     return (
-        node.index, node.scan, float(node.stamp), *node.pose_in_local.tolist(), *node.sensor.tolist(),
-        float(node.residual), int(node.doubtful), int(node.begins),
+        node.index, node.scan, *map(_kept, (node.stamp, *node.pose_in_local, *node.sensor, node.residual)),
+        int(node.doubtful), int(node.begins),
         node.returns.tobytes(), node.free_ends.tobytes(), node.ghosts.tobytes(),
     )  # fmt: skip
 
@@ -53,9 +62,9 @@ def node_of(row: Row) -> Node:
     return Node(
         index=number,
         scan=scan,
-        stamp=stamp,
-        pose_in_local=np.array([x, y, theta]),
-        sensor=np.array([sx, sy]),
+        stamp=_number(stamp),
+        pose_in_local=np.array([*map(_number, (x, y, theta))]),
+        sensor=np.array([*map(_number, (sx, sy))]),
         returns=returns,
         free_ends=free_ends,
         residual=_number(residual),
@@ -92,14 +101,17 @@ def closure_of(row: Row) -> Closure:
     return Closure(candidate, rejected, measured, covariance.reshape(3, 3), bool(ambiguous), bool(searched))
 
 
-def _plain(value: float) -> float:
-    """A number as the database takes it: truth values as 0 and 1."""
-    return int(value) if isinstance(value, bool) else value
+def _kept(value: float) -> float | bytes:
+    """A number as the database gives it back: it has neither NaN nor -0.0, which go as their bytes."""
+    value = float(value)
+    if math.isnan(value) or (value == 0.0 and math.copysign(1.0, value) < 0.0):
+        return _DOUBLE.pack(value)
+    return value
 
 
-def _number(value: float | None) -> float:
-    """A number as it was: the database has no NaN."""
-    return float("nan") if value is None else value
+def _number(value: float | bytes) -> float:
+    """A number as it was."""
+    return _DOUBLE.unpack(value)[0] if isinstance(value, bytes) else value
 
 
 def _points(blob: bytes) -> Float32Array:

@@ -1,15 +1,16 @@
 """Tables of a session file, and how files of earlier versions become files of this one."""
 
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Final
+from typing import Any, Final
 
 APPLICATION_ID: Final = 0x474C5353  # "GLSS"
 VERSION: Final = 1
 
 TABLES: Final = {
-    "facts": {"name": "TEXT PRIMARY KEY", "value": "TEXT NOT NULL"},
+    "facts": {"name": "TEXT PRIMARY KEY", "value": "TEXT NOT NULL", "seal": "INTEGER"},
     "scans": {
         "number": "INTEGER PRIMARY KEY",
         "stamp": "REAL", "x": "REAL", "y": "REAL", "theta": "REAL", "residual": "REAL",
@@ -18,25 +19,29 @@ TABLES: Final = {
         "returns": "INTEGER", "is_node": "INTEGER",
         "usual_residual": "REAL", "since_gap": "INTEGER", "since_start": "INTEGER", "in_doubt": "INTEGER",
         "searches": "INTEGER", "searches_taken": "INTEGER", "relocalisations": "INTEGER",
-        "relocalised": "INTEGER", "coasted": "INTEGER", "unmatched": "INTEGER",
+        "relocalised": "INTEGER", "coasted": "INTEGER", "unmatched": "INTEGER", "seal": "INTEGER",
     },
     "nodes": {
         "number": "INTEGER PRIMARY KEY",
         "scan": "INTEGER", "stamp": "REAL", "x": "REAL", "y": "REAL", "theta": "REAL",
         "sensor_x": "REAL", "sensor_y": "REAL", "residual": "REAL",
         "doubtful": "INTEGER", "begins": "INTEGER",
-        "returns": "BLOB", "free_ends": "BLOB", "ghosts": "BLOB",
+        "returns": "BLOB", "free_ends": "BLOB", "ghosts": "BLOB", "seal": "INTEGER",
     },
-    "rounds": {"number": "INTEGER PRIMARY KEY", "searches": "INTEGER"},
+    "rounds": {"number": "INTEGER PRIMARY KEY", "searches": "INTEGER", "seal": "INTEGER"},
     "searches": {
         "number": "INTEGER PRIMARY KEY",
         "round": "INTEGER", "node": "INTEGER", "anchor": "INTEGER", "submap": "INTEGER",
         "rejected": "TEXT", "ambiguous": "INTEGER", "searched": "INTEGER", "numbers": "BLOB",
+        "seal": "INTEGER",
     },
-    "arrays": {"name": "TEXT PRIMARY KEY", "type": "TEXT", "shape": "TEXT", "data": "BLOB"},
+    "arrays": {
+        "name": "TEXT PRIMARY KEY", "type": "TEXT", "shape": "TEXT", "data": "BLOB", "seal": "INTEGER",
+    },
 }  # fmt: skip
 """Columns of every table. The rows of `scans`, `nodes`, `rounds` and `searches` are written as the run
-goes and never changed; `facts` and `arrays` hold what describes the run, and at its end what it found."""
+goes and never changed; `facts` and `arrays` hold what describes the run, and at its end what it found. The
+last column seals a row: the database itself does not notice a byte that is changed."""
 
 MIGRATIONS: Mapping[int, Callable[[sqlite3.Connection], None]] = {}
 """Version -> what makes a file of this version one of the next."""
@@ -65,9 +70,35 @@ def create_tables(database: sqlite3.Connection) -> None:
         database.execute(f"CREATE TABLE {name} ({described})")
 
 
-def insertion(table: str) -> str:
-    """The statement that adds a row to a table."""
-    return f"INSERT INTO {table} VALUES ({', '.join('?' * len(TABLES[table]))})"  # noqa: S608  (own names only)
+def insert(database: sqlite3.Connection, table: str, rows: Iterable[Sequence[Any]]) -> None:
+    """Add rows to a table, each with its seal."""
+    places = ", ".join("?" * len(TABLES[table]))
+    database.executemany(
+        f"INSERT INTO {table} VALUES ({places})",  # noqa: S608  (own names only)
+        ((*row, seal(row)) for row in rows),
+    )
+
+
+def unsealed(row: Sequence[Any]) -> tuple[Any, ...]:
+    """A row without its seal.
+
+    Raises
+    ------
+    ValueError
+        The seal is broken: the row is not what was written.
+    """
+    *values, mark = row
+    if seal(values) != mark:
+        raise ValueError("a row is not what was written")
+    return tuple(values)
+
+
+def seal(row: Sequence[Any]) -> int:
+    """Checksum of a row."""
+    mark = 0
+    for value in row:
+        mark = zlib.crc32(value if isinstance(value, bytes) else repr(value).encode(), mark)
+    return mark
 
 
 def migrate(database: sqlite3.Connection) -> None:

@@ -1,8 +1,9 @@
 """The session of a run: one file that holds all it needs to be taken up, and all that is drawn from it."""
 
 import os
-from collections.abc import Sequence
-from contextlib import suppress
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -11,11 +12,31 @@ from typing import Any, Final, Self
 from glassslam.config import Config
 from glassslam.errors import SessionError
 from glassslam.finished import FinishedRun
-from glassslam.session.database import create, damaged, explained, open_existing, write_compact
+from glassslam.records import FloatArray
+from glassslam.session.database import (
+    complete_file,
+    create,
+    damaged,
+    explained,
+    open_existing,
+    reading,
+    write_compact,
+)
 from glassslam.session.identity import Recorded, digest, identify
 from glassslam.session.journal import SessionJournal
 from glassslam.session.schema import transaction
-from glassslam.session.store import load_finished, read_facts, save_finished, tupled, write_facts
+from glassslam.session.store import (
+    forget_finished,
+    load_finished,
+    read_facts,
+    read_nodes,
+    read_scans,
+    save_finished,
+    tupled,
+    write_facts,
+)
+from glassslam.slam.closure import Closure
+from glassslam.slam.node import Node
 from glassslam.sources import SourceOptions
 from glassslam.yamltext import parse_yaml
 
@@ -36,6 +57,8 @@ class Session:
         Which part of the recordings is read, and how.
     recordings : tuple of Recorded
         The recordings, in their order.
+    version : str
+        The version of glassslam that has begun the run.
     journal : SessionJournal
         What is known of the run, and where the rest is written down.
 
@@ -48,16 +71,25 @@ class Session:
 
     def __init__(self, path: Path, database: Any) -> None:
         self.path, self._database, self._is_closed = path, database, False
-        with explained(path):
+        try:
+            with explained(path):
+                self._read()
+        except BaseException:  # whoever asks again must find the file free
+            self.abandon()
+            raise
+
+    def _read(self) -> None:
+        path, database = self.path, self._database
+        try:
             self._facts = read_facts(database)
-            try:
-                self.config = Config.from_mapping(parse_yaml(self._facts["config"]), str(path))
-                self.recordings = tuple(Recorded(**known) for known in self._facts["recordings"])
-                self._sonar = self._facts["sonar"] and Recorded(**self._facts["sonar"])
-                self.options = _options(self._facts["options"], self._sonar)
-            except (KeyError, TypeError) as error:
-                raise damaged(path, f"it does not tell the recording ({error})") from error
-            self.journal = SessionJournal(database, path)
+            self.config = Config.from_mapping(parse_yaml(self._facts["config"]), str(path))
+            self.recordings = tuple(Recorded(**known) for known in self._facts["recordings"])
+            self._sonar = self._facts["sonar"] and Recorded(**self._facts["sonar"])
+            self.options = _options(self._facts["options"], self._sonar)
+            self.version = str(self._facts["glassslam"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise damaged(path, f"it does not tell the recording ({error})") from error
+        self.journal = SessionJournal(database, path)
 
     @classmethod
     def create(
@@ -114,15 +146,24 @@ class Session:
         """
         return cls(Path(path), open_existing(Path(path)))
 
+    @staticmethod
+    def copy(path: str | Path, target: Path) -> None:
+        """Copy a session file that no run is using; it may be of an earlier version.
+
+        Raises
+        ------
+        SessionError
+            There is none, or it is of another program, of a newer version, or damaged.
+        OutputError
+            The copy cannot be written.
+        """
+        with reading(Path(path)) as database:
+            write_compact(database, Path(path), target)
+
     @property
     def is_finished(self) -> bool:
         """Whether the run came to its end."""
         return "is_whole" in self._facts
-
-    @property
-    def version(self) -> str:
-        """The version of glassslam that has begun the run."""
-        return str(self._facts["glassslam"])
 
     def check_recordings(self, recordings: Sequence[str | Path] | None = None) -> list[str]:
         """Paths to read the recordings from, when they are the same as ever.
@@ -149,19 +190,27 @@ class Session:
             _check_same(path, known)
         return now
 
-    def copy(self, path: Path, config: Config) -> "Session":
-        """A copy of this session in a new file, for a run with another configuration.
+    def change(self, config: Config, *, keep_findings: bool) -> None:
+        """Take another configuration for what is still to be done.
+
+        Parameters
+        ----------
+        config : Config
+            The configuration.
+        keep_findings : bool
+            Whether the finished run stays; otherwise it is open again, and what is known of SLAM stays.
 
         Raises
         ------
         OutputError
-            The file cannot be written.
+            The disk is full.
         """
-        write_compact(self._database, self.path, path)
-        database = open_existing(path)
-        with explained(path), transaction(database):
-            write_facts(database, {"config": config.dump()})
-        return type(self)(path, database)
+        with explained(self.path), transaction(self._database):
+            if not keep_findings:
+                forget_finished(self._database)
+            write_facts(self._database, {"config": config.dump()})
+            self._facts = read_facts(self._database)
+        self.config = config
 
     def save(self, run: FinishedRun) -> None:
         """Write down everything about a finished run.
@@ -188,11 +237,57 @@ class Session:
         """
         if not self.is_finished:
             raise SessionError(f"the run of {self.path} is not finished", "go on with glassslam map --resume")
-        with explained(self.path):
-            try:
-                return load_finished(self._database, self.config)
-            except (KeyError, ValueError, TypeError, IndexError) as error:
-                raise damaged(self.path, f"{type(error).__name__} {error}") from error
+        with self._sensible():
+            return load_finished(self._database, self.config)
+
+    def nodes(self) -> tuple[Node, ...]:
+        """The nodes known so far.
+
+        Raises
+        ------
+        SessionError
+            The file is damaged.
+        """
+        with self._sensible():
+            return read_nodes(self._database)
+
+    def scans(self) -> tuple[FloatArray, FloatArray]:
+        """Stamps, s, shape (n,), and local poses, m and rad, shape (n, 3), of the scans known so far.
+
+        Raises
+        ------
+        SessionError
+            The file is damaged.
+        """
+        with self._sensible():
+            return read_scans(self._database)
+
+    def rounds(self) -> list[list[Closure]]:
+        """What the rounds of searches known so far have found.
+
+        Raises
+        ------
+        SessionError
+            The file is damaged.
+        """
+        journal = SessionJournal(self._database, self.path)
+        return [*iter(journal.recall_round, None)]
+
+    def check(self) -> None:
+        """Read everything once.
+
+        Raises
+        ------
+        SessionError
+            Something is not what was written.
+        """
+        with self._sensible():
+            complaint = self._database.execute("PRAGMA integrity_check").fetchone()[0]
+            if complaint != "ok":
+                raise ValueError(" ".join(complaint.split()))
+            if self.is_finished:
+                load_finished(self._database, self.config)
+        self.nodes(), self.scans(), self.rounds()
 
     def settle_in(self, folder: Path) -> Path:
         """Close the session and leave it in a folder, the same bytes for the same run however it came about.
@@ -214,6 +309,7 @@ class Session:
         """
         settled, compact = folder / SESSION_FILE, folder / f"{SESSION_FILE}.new"
         write_compact(self._database, self.path, compact)
+        complete_file(self._database, self.path)
         self.abandon()
         if settled == self.path:
             remove_logs(self.path)
@@ -236,6 +332,14 @@ class Session:
         """Close the file without writing anything more."""
         self._is_closed = True
         self._database.close()
+
+    @contextmanager
+    def _sensible(self) -> Iterator[None]:
+        with explained(self.path):
+            try:
+                yield
+            except (KeyError, ValueError, TypeError, IndexError, struct.error) as error:
+                raise damaged(self.path, f"{type(error).__name__} {error}") from error
 
     def __enter__(self) -> Self:
         return self

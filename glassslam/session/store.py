@@ -16,16 +16,19 @@ from glassslam.grid.probability_grid import OddsModel, ProbabilityGrid
 from glassslam.grid.submap import Submap
 from glassslam.posegraph.graph import Constraint
 from glassslam.posegraph.storage import KINDS
-from glassslam.records import Damage, PointSet, RangeRing, RecordingInfo, SonarRing, Trajectory
-from glassslam.session.rows import node_of
-from glassslam.session.schema import insertion
+from glassslam.records import Damage, FloatArray, PointSet, RangeRing, RecordingInfo, SonarRing, Trajectory
+from glassslam.session.rows import node_of, scan_outcome, scan_stamps
+from glassslam.session.schema import insert, unsealed
 from glassslam.slam.glass_locks import locks_submaps, miss_probability
+from glassslam.slam.node import Node
 from glassslam.slam.result import RunStatistics
 from glassslam.slam.settled import GlassFindings, SettledRun
 from glassslam.slam.trajectory import PoseTracks
 
 Arrays = dict[str, NDArray[Any]]
 
+FINISHED = ("arrays", "calibration", "is_whole", "source", "statistics")
+"""Facts that only a finished run has."""
 _LOCAL, _PARTIAL, _NODES, _FINAL = "tracks.local", "tracks.partial", "tracks.nodes", "tracks.final"
 
 
@@ -41,7 +44,7 @@ def save_finished(database: sqlite3.Connection, run: FinishedRun) -> None:
         **_points(run.points),
     }
     database.execute("DELETE FROM arrays")
-    database.executemany(insertion("arrays"), [_packed(name, array) for name, array in arrays.items()])
+    insert(database, "arrays", [_packed(name, array) for name, array in arrays.items()])
     learnt = settled.glass and settled.glass.calibration
     write_facts(
         database,
@@ -50,8 +53,16 @@ def save_finished(database: sqlite3.Connection, run: FinishedRun) -> None:
             "source": {**asdict(run.facts), "info": _plain_info(run.facts.info)},
             "calibration": learnt.to_dict() if learnt else None,
             "is_whole": run.is_whole,
+            "arrays": sorted(arrays),
         },
     )
+
+
+def forget_finished(database: sqlite3.Connection) -> None:
+    """Take a finished run out again, and leave the rows written on its way."""
+    database.execute("DELETE FROM arrays")
+    names = ", ".join(f"'{name}'" for name in FINISHED)
+    database.execute(f"DELETE FROM facts WHERE name IN ({names})")  # noqa: S608  (own names only)
 
 
 def load_finished(database: sqlite3.Connection, config: Config) -> FinishedRun:
@@ -64,15 +75,18 @@ def load_finished(database: sqlite3.Connection, config: Config) -> FinishedRun:
     config : Config
         Its configuration.
     """
-    arrays = {row[0]: _unpacked(row) for row in database.execute("SELECT * FROM arrays")}
+    arrays = {row[0]: _unpacked(unsealed(row)) for row in database.execute("SELECT * FROM arrays")}
     facts = read_facts(database)
     source = facts["source"]
+    nodes, tracks = read_nodes(database), _read_tracks(arrays)
+    if len(nodes) != len(tracks.nodes.poses):
+        raise ValueError(f"{len(nodes)} of {len(tracks.nodes.poses)} nodes")
     settled = SettledRun(
         config=config,
-        nodes=tuple(map(node_of, database.execute("SELECT * FROM nodes ORDER BY number"))),
+        nodes=nodes,
         submaps=_read_submaps(arrays, config),
         constraints=_read_constraints(arrays),
-        tracks=_read_tracks(arrays),
+        tracks=tracks,
         statistics=TypeAdapter(RunStatistics).validate_python(facts["statistics"]),
         glass=_read_glass(arrays, facts["calibration"]),
     )
@@ -94,14 +108,41 @@ def write_facts(database: sqlite3.Connection, facts: dict[str, Any]) -> None:
     """Add facts to those there are, all in one order whatever was there before."""
     together = {**read_facts(database), **facts}
     database.execute("DELETE FROM facts")
-    database.executemany(
-        insertion("facts"), [(name, json.dumps(together[name])) for name in sorted(together)]
-    )
+    insert(database, "facts", [(name, json.dumps(together[name])) for name in sorted(together)])
 
 
 def read_facts(database: sqlite3.Connection) -> dict[str, Any]:
     """All facts by name."""
-    return {name: json.loads(text) for name, text in database.execute("SELECT name, value FROM facts")}
+    return {name: json.loads(text) for name, text in map(unsealed, database.execute("SELECT * FROM facts"))}
+
+
+def read_nodes(database: sqlite3.Connection) -> tuple[Node, ...]:
+    """All nodes, in their order.
+
+    Raises
+    ------
+    ValueError
+        One is missing, or is not what was written.
+    """
+    rows = database.execute("SELECT * FROM nodes ORDER BY number")
+    nodes = tuple(node_of(unsealed(row)) for row in rows)
+    if [node.index for node in nodes] != [*range(len(nodes))]:
+        raise ValueError("a node is missing")
+    return nodes
+
+
+def read_scans(database: sqlite3.Connection) -> tuple[FloatArray, FloatArray]:
+    """Stamps, shape (n,), and local poses, shape (n, 3), of all scans, in their order.
+
+    Raises
+    ------
+    ValueError
+        One is missing, or is not what was written.
+    """
+    rows = [unsealed(row) for row in database.execute("SELECT * FROM scans ORDER BY number")]
+    if [row[0] for row in rows] != [*range(len(rows))]:
+        raise ValueError("a scan is missing")
+    return scan_stamps(rows), np.array([scan_outcome(row).match.pose for row in rows]).reshape(-1, 3)
 
 
 def _packed(name: str, array: NDArray[Any]) -> tuple[str, str, str, bytes]:

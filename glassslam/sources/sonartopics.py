@@ -9,6 +9,8 @@ from glassslam.sources.options import SourceOptions
 from glassslam.sources.sonarfeed import POINTS_OF
 from glassslam.sources.topics import describe
 
+# few points a message come from radars and clusters of lidars as well
+_OTHER_SENSOR = re.compile(r"radar|lidar|laser|camera|depth", re.IGNORECASE)
 _SOUNDS_LIKE_SONAR = re.compile(r"sonar|ultra|toposens", re.IGNORECASE)
 
 
@@ -16,7 +18,8 @@ def sonar_topics(topics: Sequence[Topic], seconds: float, options: SourceOptions
     """The named topics, or all that may be sonar; and those named as points.
 
     Without a wish the former are all ranges and 3D ultrasonic scans, clouds (which turn out to be sonar when
-    they hold few points), and arrays of numbers whose name tells what they are.
+    they hold few points, unless their name tells of another sensor), and arrays of numbers whose name tells
+    what they are.
 
     Parameters
     ----------
@@ -65,9 +68,12 @@ def _named(
 
 
 def _may_be_sonar(topic: Topic) -> bool:
-    if topic.msgtype in {RANGE, TS_SCAN, CLOUD, CLOUD2}:
+    sounds = _SOUNDS_LIKE_SONAR.search(topic.name) is not None
+    if topic.msgtype in {CLOUD, CLOUD2}:
+        return sounds or _OTHER_SENSOR.search(topic.name) is None
+    if topic.msgtype in {RANGE, TS_SCAN}:
         return True
-    return topic.msgtype == RANGE_ARRAY and _SOUNDS_LIKE_SONAR.search(topic.name) is not None
+    return topic.msgtype == RANGE_ARRAY and sounds
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:

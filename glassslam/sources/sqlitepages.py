@@ -3,6 +3,7 @@
 The format is described in "Database File Format" of the SQLite documentation, sections 1.3, 1.6 and 2.1.
 """
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -247,6 +248,8 @@ def _value(kind: int, data: bytes) -> Value:
         return int.from_bytes(data, "big", signed=True)
     if kind in (_ZERO, _ONE):
         return kind - _ZERO
+    if kind == _REAL:
+        return float(struct.unpack(">d", data)[0])
     if kind >= _FIRST_BLOB:
         return data if kind % 2 == 0 else data.decode(errors="replace")
     return None

@@ -1,0 +1,136 @@
+"""`glassslam render`: draw the results of a run again, without SLAM."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from glassslam.cli.run import (
+    Manner,
+    conclude,
+    explained_end,
+    go_on_with,
+    made_directory,
+    make_room,
+    named_target,
+    session_path,
+)
+from glassslam.errors import GlassSlamError, InterruptedRunError, OutputError, UsageError
+
+if TYPE_CHECKING:
+    from glassslam.config import Config
+    from glassslam.finished import FinishedRun
+    from glassslam.session import Session
+
+EXAMPLES = """\
+  glassslam render run-map --set map.resolution=0.02             finer cells
+  glassslam render run-map --set glass.scheme=off -o no-glass    without glass in the map
+  glassslam render run-map --set sonar.fusion.method=rsf_all     another decision layer
+  glassslam render run-map --calibration mine/                   look for glass in another way
+"""
+
+Directory = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Results of glassslam map.", show_default=False)
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", metavar="DIR", help="Results directory [default: the same one]."),
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="SECTION.NAME=VALUE", help="Change one parameter; may be repeated."),
+]
+Sensor = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Look for glass with a lidar of this kind; see map.")
+]
+CalibrationFile = Annotated[
+    Path | None,
+    typer.Option("--calibration", metavar="FILE", help="Look for glass with the calibration of this lidar."),
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace earlier results in the output.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the report as JSON instead of the summary.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+def render(
+    directory: Directory,
+    output: Output = None,
+    assignments: Assignments = None,
+    sensor: Sensor = None,
+    calibration: CalibrationFile = None,
+    overwrite: Overwrite = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Draw all results of a run again with other parameters of map, glass, sonar and fusion.
+
+    Poses stay as they are: parameters that take part in SLAM are refused. Everything comes from session.db;
+    the recording is read only where scans have to be looked at for glass once more. The results are those
+    that glassslam map gives with these parameters.
+    """
+    from glassslam.cli.settings import (  # noqa: PLC0415
+        assigned,
+        calibration_assignments,
+        sensor_assignments,
+    )
+    from glassslam.outputs import Stopwatch  # noqa: PLC0415  (loads numpy)
+
+    manner = Manner(Stopwatch(), json=json, quiet=quiet)
+    wishes = [
+        *sensor_assignments(sensor),
+        *calibration_assignments(calibration, sensor),
+        *(assignments or ()),
+    ]
+    target = named_target(directory)
+    return _render(
+        session_path(target),
+        output or target,
+        lambda config: assigned(config, wishes),
+        overwrite=overwrite or output is None,
+        manner=manner,
+    )
+
+
+def _render(
+    source: Path, target: Path, change: "Callable[[Config], Config]", *, overwrite: bool, manner: Manner
+) -> int:
+    """Draw the results of a session into a directory."""
+    from glassslam.outputs import check_directory  # noqa: PLC0415
+    from glassslam.outputs.directory import restore_results, working_directory  # noqa: PLC0415
+    from glassslam.outputs.lock import locked  # noqa: PLC0415
+    from glassslam.session import SESSION_FILE, Session  # noqa: PLC0415
+
+    with locked(target):
+        restore_results(target)
+        check_directory(target, overwrite=overwrite)
+        folder = working_directory(target)
+        if source.parent != folder:
+            make_room(folder, target, overwrite=False)
+            with made_directory(folder):
+                Session.copy(source, folder / SESSION_FILE)
+        with explained_end(target), Session.open(folder / SESSION_FILE) as session:
+            try:
+                finished = _changed(session, change(session.config), target, manner)
+                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+            except (OutputError, InterruptedRunError):
+                raise
+            except GlassSlamError:  # the session it was made from is where it was
+                if source.parent != folder:
+                    session.abandon()
+                    shutil.rmtree(folder)
+                raise
+
+
+def _changed(session: "Session", config: "Config", target: Path, manner: Manner) -> "FinishedRun":
+    """The finished run of a session with another configuration."""
+    from glassslam.session.changes import needs_recording  # noqa: PLC0415
+
+    if not session.is_finished:
+        raise UsageError(f"the run of {target} is not finished", f"go on: glassslam map --resume {target}")
+    again = needs_recording(session.config, config)
+    if again:
+        session.check_recordings()
+    session.change(config, keep_findings=not again)
+    return go_on_with(session, None, target, manner) if again else session.load()
