@@ -13,6 +13,8 @@ from glassslam.yamltext import parse_yaml
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Weight = Annotated[float, Field(ge=0, le=1e6)]
+Noise = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False)]
+Height = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Probability = Annotated[float, Field(gt=0, lt=1)]
 FreeProbability = Annotated[float, Field(gt=0, le=0.5)]
@@ -63,7 +65,7 @@ class FilterConfig(Section):
 class LocalConfig(Section):
     """Matching of a scan against the active submap."""
 
-    occupied_space_weight: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+    occupied_space_weight: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
     """Weight of the root mean square of 1 - P(occupied) at the returns."""
     translation_weight: Weight = 0.5
     """Weight of the odometry's translation, 1/m after 1 m of travel; falls with the root of the travel."""
@@ -133,9 +135,9 @@ class LoopClosureConfig(Section):
     """Largest root mean square of 1 - P(occupied) after refinement."""
     neighbourhood: NonNegative = 4.0
     """Travel before and after a node whose scans are matched together with its own, m."""
-    translation_noise: Positive = 0.05
+    translation_noise: Noise = 0.05
     """Least standard deviation of a closure, m."""
-    rotation_noise: Positive = 0.01
+    rotation_noise: Noise = 0.01
     """Least standard deviation of a closure, rad."""
 
 
@@ -144,9 +146,9 @@ class OptimizationConfig(Section):
 
     optimize_every_n_nodes: Count = 90
     """Nodes between two rounds of search and optimisation."""
-    odometry_translation_noise: Positive = 0.015
+    odometry_translation_noise: Noise = 0.015
     """Standard deviation of the step between consecutive nodes of local SLAM, m."""
-    odometry_rotation_noise: Positive = 0.003
+    odometry_rotation_noise: Noise = 0.003
     """Standard deviation of that step, rad."""
     huber_scale: Positive = 1.5
     """Norm of a closure's weighted residual from which it loses weight."""
@@ -366,13 +368,13 @@ class SonarConfig(Section):
 class VolumeConfig(Section):
     """3D maps from the lidar and the points of 3D ultrasonic sensors."""
 
-    resolution: Positive = 0.05
+    resolution: Annotated[float, Field(ge=0.005, allow_inf_nan=False)] = 0.05
     """Edge of a voxel, m."""
-    lidar_height: Finite | None = None
+    lidar_height: Height | None = None
     """Height of the plane of the lidar above the base, m; without one that of the recording, or else 0.2."""
-    band_low: Finite = 0.1
+    band_low: Height = 0.1
     """Lowest height that goes into the 2D map and the pictures, m above the base."""
-    band_high: Finite = 1.8
+    band_high: Height = 1.8
     """Highest of them, m above the base."""
     projection: Literal["max", "pool"] = "max"
     """What becomes of a column of voxels: its most occupied one decides, or all that are known."""

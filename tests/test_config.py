@@ -153,3 +153,35 @@ class TestRefused:
         path.write_text("map:\n  resolution: 0\n")
         with pytest.raises(UsageError, match=r"run\.yaml: map\.resolution: Input should be greater than 0"):
             Config.load(path)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"band_low": 2.0}, "volume: no height lies between band_low 2 and band_high 1.8 m"),
+        (
+            {"band_low": 0.5, "band_high": 0.5},
+            "volume: no height lies between band_low 0.5 and band_high 0.5 m",
+        ),
+        (
+            {"occupied_threshold": 0.98},
+            "volume: occupied_threshold does not lie between min_probability and max_probability",
+        ),
+        (
+            {"lidar_weight": 0.0, "ultrasonic_weight": 0.0},
+            "volume: lidar_weight and ultrasonic_weight are both 0",
+        ),
+        ({"lidar_height": math.nan}, "volume.lidar_height: Input should be a finite number"),
+        ({"resolution": 0.001}, "volume.resolution: Input should be greater than or equal to 0.005"),
+        ({"lidar_free": 0.6}, "volume.lidar_free: Input should be less than or equal to 0.5"),
+        (
+            {"ultrasonic_occupied": 0.4},
+            "volume.ultrasonic_occupied: Input should be greater than or equal to 0.5",
+        ),
+        ({"ultrasonic_half_angle_deg": 181}, "volume.ultrasonic_half_angle_deg: Input should be less than"),
+    ],
+)
+def test_senseless_volumes_are_refused(values, words):
+    with pytest.raises(ConfigError, match=words):
+        Config.from_mapping({"volume": values})
+    assert Config.from_mapping({"volume": {"band_low": 2.0, "band_high": 3.0}}).volume.band_low == 2.0

@@ -151,7 +151,8 @@ def _odometry_rows(odometry: "OdometryReport") -> Rows:
 
 
 def _sonar_rows(sonar: "SonarReport") -> Rows:
-    yield f"sonar {_listed(sonar.topics)}", _times(sonar.stamps)
+    kind = "sonar" if sonar.sonars else "points"
+    yield f"{kind} {_listed(sonar.topics)}", _times(sonar.stamps)
     if sonar.sonars:
         limits = f"limits {sonar.range_min:g} to {sonar.limit:g} m"
         yield "", f"{sonar.sonars} sonars, ring {sonar.ring}, {limits}"

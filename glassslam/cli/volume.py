@@ -38,7 +38,7 @@ Output = Annotated[
     typer.Option("--output", "-o", metavar="DIR", help="Results directory [default: NAME-volume]."),
 ]
 Resolution = Annotated[
-    float | None, typer.Option(min=0.001, metavar="M", help="Edge of a voxel, m [default: 0.05].")
+    float | None, typer.Option(min=0.005, metavar="M", help="Edge of a voxel, m [default: 0.05].")
 ]
 BandOption = Annotated[
     tuple[float, float] | None,
@@ -94,8 +94,8 @@ def volume(
     """Build a 3D map from a 2D lidar and a 3D ultrasonic sensor along a trajectory that is known.
 
     DIR then holds volume.npz, volume.bt (OctoMap), volume.ply, volume.png, slices.png, and the heights of
-    the band projected on a 2D map, volume_map.yaml and volume_map.pgm. Parameters are those of the section
-    volume of the configuration, of which some have an option of their own.
+    the band projected on a 2D map, volume_map.yaml and volume_map.pgm. All parameters are in the section
+    volume of the configuration; some have an option of their own.
     """
     from glassslam.cli.settings import parse_pose, resolve_config  # noqa: PLC0415
     from glassslam.outputs import read_tum  # noqa: PLC0415  (loads numpy)

@@ -21,12 +21,14 @@ from glassslam.outputs.html_rows import (
     WALL_COLUMNS,
     alarms,
     cost_rows,
+    degeneracy_rows,
     glass_rows,
     recorded,
     recording_name,
     recording_rows,
     run_rows,
     sonar_rows,
+    tracking_rows,
     travelled,
     volume_rows,
     wall_cells,
@@ -35,7 +37,7 @@ from glassslam.slam.result import MapResult
 
 HTML_REPORT: Final = "report.html"
 # A page is read by people: what is longer stands in full in the files beside it.
-_MOST_LINES, _MOST_WALLS, _MOST_CHARACTERS = 50, 1000, 2000
+_MOST_LINES, _MOST_WALLS, _MOST_ROWS, _MOST_CHARACTERS = 50, 1000, 200, 2000
 
 _ROS2 = """\
 ros2 run nav2_map_server map_server --ros-args -p yaml_filename:=map.yaml
@@ -87,6 +89,7 @@ def _sections(result: MapResult, report: dict[str, Any], folder: Path) -> Iterat
     yield _alarm(alarms(report))
     yield section("Map", picture_figures(folder))
     yield section("Run", facts(_short(run_rows(report))))
+    yield section("Uncertain stretches", _uncertain(report))
     yield section("Glass", facts(_short(glass_rows(report["glass"]))) + _walls(result))
     yield section("Sonar", facts(_short(sonar_rows(result.sonar, result.config.sonar))))
     yield section("Volume", facts(_short(volume_rows(report["volume"]))))
@@ -109,6 +112,19 @@ def _alarm(texts: Sequence[str]) -> str:
     if hidden := len(texts) - len(shown):
         shown.append(f"and {hidden} more, see report.json")
     return f'<section class="alarm">\n<h2>Warnings</h2>\n{bullets(shown)}\n</section>'
+
+
+def _uncertain(report: dict[str, Any]) -> str:
+    rows = list(_short(islice(degeneracy_rows(report), _MOST_ROWS)))
+    if (hidden := len(report["degeneracies"]) - _MOST_ROWS) > 0:
+        rows.append(("more", f"{hidden}, see report.json"))
+    said = "Times from the first scan, places in the map frame, in m." if rows else ""
+    return "\n".join(filter(None, (said and paragraph(said, "faint"), facts(rows), _tracking(report))))
+
+
+def _tracking(report: dict[str, Any]) -> str:
+    rows = facts(tracking_rows(report))
+    return rows and f"<details>\n<summary>Tracking in numbers</summary>\n{rows}\n</details>"
 
 
 def _walls(result: MapResult) -> str:

@@ -90,6 +90,21 @@ def run_rows(report: Report) -> Rows:
         yield "solver", f"failed {report['solver_failures']} times"
 
 
+def degeneracy_rows(report: Report) -> Rows:
+    """Stretches the scans did not decide: what, when, where and how long."""
+    for one in report["degeneracies"]:
+        start, end = (_number(one[f"{side}_after_seconds"], 1) for side in ("start", "end"))
+        places = (", ".join(_number(value, 1) for value in one[f"{side}_place"]) for side in ("start", "end"))
+        where = "({}) to ({})".format(*places)
+        yield one["kind"], f"{start} to {end} s, {where}, {_number(one['length_m'], 1)} m: {one['text']}"
+
+
+def tracking_rows(report: Report) -> Rows:
+    """What local SLAM and the loop closures had to do beside plain matching."""
+    for name, count in report["tracking"].items():
+        yield name.replace("_", " "), f"{count}"
+
+
 def glass_rows(glass: dict[str, Any]) -> Rows:
     """What the detector was and what it has found."""
     yield "detector", glass["detector"]

@@ -107,6 +107,8 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
         "constraints": dict(sorted(Counter(constraint.kind for constraint in result.constraints).items())),
         "solver_failures": statistics.solver_failures,
         "residuals": dict(statistics.residuals),
+        "tracking": dict(statistics.tracking),
+        "degeneracies": _degeneracies(result),
         "map": {
             "resolution": result.map.resolution,
             "rows": rows,
@@ -127,6 +129,28 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "real_time_factor": real_time_factor(statistics, usage.wall),
         }
     return _plain(report)  # type: ignore[no-any-return]
+
+
+def _degeneracies(result: MapResult) -> list[dict[str, Any]]:
+    """Stretches a reader should know of; times from the first scan beside the stamps."""
+    stamps = result.trajectory.stamps
+    first = float(stamps[0]) if len(stamps) else 0.0
+    return [
+        {
+            "kind": one.kind,
+            "first_scan": one.first_scan,
+            "last_scan": one.last_scan,
+            "start": one.start,
+            "end": one.end,
+            "start_after_seconds": one.start - first,
+            "end_after_seconds": one.end - first,
+            "start_place": list(one.start_place),
+            "end_place": list(one.end_place),
+            "length_m": one.length,
+            "text": one.text,
+        }
+        for one in result.statistics.degeneracies
+    ]
 
 
 def _glass(result: MapResult) -> dict[str, Any]:

@@ -181,7 +181,9 @@ class _Planner:
         moved = []
         for times, framed in stretches(self._bags, topic, partial(framed_points, topic)):
             matrix = self._matrix(topic, framed[0][0])
-            moved.append((times, [points @ matrix[:3, :3].T + matrix[:3, 3] for _, points in framed]))
+            # echoes that are not finite are left out when they are due
+            with np.errstate(invalid="ignore"):
+                moved.append((times, [points @ matrix[:3, :3].T + matrix[:3, 3] for _, points in framed]))
         return moved
 
     def _is_dense(self, topic: Topic) -> bool:

@@ -167,7 +167,9 @@ class SonarFeed:
 
     def _in_base(self, topic: Topic, points: Float32Array) -> Float32Array:
         matrix = self._plan.base_from_frame[topic.name]
-        return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float32)
+        # a mount as far away as a transform can say is no number any more in single precision
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float32)
 
 
 def limited_range(message: Any) -> float:

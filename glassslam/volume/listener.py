@@ -1,6 +1,6 @@
 """What 3D ultrasonic sensors add to a run: a volume along its trajectory, and a map of a band of heights."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -86,6 +86,8 @@ class VolumeListener:
         mapper = VolumeMapper(result.trajectory, options)
         _feed(mapper, result, self._records)
         volume = mapper.finish()
+        if volume.fused.count() == (0, 0):
+            raise GridError("nothing of it could be placed", _listed(volume.dropped))
         if result.glass is not None and result.config.glass.scheme != "off":
             lock_walls(volume.fused, result.glass.walls, options.lidar_height)
         return self._described(volume, options.lidar_height)
@@ -119,14 +121,17 @@ def _feed(mapper: VolumeMapper, result: MapResult, records: Sequence[PointSet]) 
 def _warnings(maps: VolumeMaps) -> Iterator[str]:
     lost, used = sum(maps.dropped.values()), maps.counts["points"]
     if lost > used:
-        reasons = ", ".join(f"{count} x {reason}" for reason, count in maps.dropped.items())
-        yield f"the volume holds {used} points, and more was left out: {reasons}"
+        yield f"the volume holds {used} points, and more was left out: {_listed(maps.dropped)}"
     low, high = maps.band
     if not low <= maps.lidar_height <= high:
         yield (
             f"the plane of the lidar, {maps.lidar_height:g} m above the base, lies outside of the heights"
             f" {low:g} to {high:g} m of the map of the volume (volume.lidar_height, volume.band_low)"
         )
+
+
+def _listed(dropped: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} x {reason}" for reason, count in dropped.items())
 
 
 def lock_walls(tree: Octree, walls: "Sequence[GlassWall]", height: float) -> None:

@@ -24,6 +24,9 @@ TOO_FAR = "too far from the origin of the volume"
 NOT_FINITE = "point that is not finite"
 OUT_OF_FIELD = "point outside of the field of view"
 
+# points come in single precision and may lie on the very border of what a sensor hears, m
+_ROUNDING = 5e-6
+
 
 @dataclass(frozen=True, slots=True)
 class Volume:
@@ -156,6 +159,9 @@ class VolumeMapper:
         if pose is None:
             self._dropped[f"point set {UNPLACED}"] += 1
             return
+        if not self._is_inside(record.origin, self._options.ultrasonic):
+            self._dropped[f"point set {TOO_FAR}"] += 1
+            return
         points = self._believed(record)
         origin = placed(pose, record.origin[None].astype(np.float64))[0]
         said = self._observed(origin, placed(pose, points), np.empty((0, 3)), self._options.ultrasonic)
@@ -172,11 +178,13 @@ class VolumeMapper:
         self, origin: FloatArray, echoes: FloatArray, silent: FloatArray, model: InverseModel
     ) -> Evidence | None:
         """What a measurement says; None where it may reach beyond the bounds of the tree."""
-        resolution = self._options.resolution
-        # not >= but not <: a place that is not a number lies nowhere
-        if not (np.abs(origin).max() + model.max_range < (CENTRE - 1) * resolution):
+        if not self._is_inside(origin, model):
             return None
-        return observe(origin, echoes, silent, model, resolution)
+        return observe(origin, echoes, silent, model, self._options.resolution)
+
+    def _is_inside(self, origin: FloatArray, model: InverseModel) -> bool:
+        """Whether all that a sensor sees from a place lies within the tree; no if that is not a number."""
+        return bool(np.abs(origin).max() + model.max_range < (CENTRE - 1) * self._options.resolution)
 
     def _believed(self, record: PointSet) -> FloatArray:
         """Points that are numbers and within the field of view of the sensor."""
@@ -185,7 +193,7 @@ class VolumeMapper:
         points, total = points[finite], len(points)
         ahead = points - record.origin
         least = np.cos(self._options.ultrasonic.half_angle)
-        seen = ahead @ np.array(record.axis) >= least * np.linalg.norm(ahead, axis=1) - 1e-9
+        seen = ahead @ np.array(record.axis) >= least * np.linalg.norm(ahead, axis=1) - _ROUNDING
         for reason, count in ((NOT_FINITE, total - len(points)), (OUT_OF_FIELD, int((~seen).sum()))):
             if count:
                 self._dropped[reason] += count

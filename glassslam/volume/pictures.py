@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from glassslam.errors import OutputError
 from glassslam.records import Float32Array
+from glassslam.slam.result import OccupancyMap
 from glassslam.volume.colours import height_colours
 from glassslam.volume.octree import CENTRE, Octree
-from glassslam.volume.projection import Band, project, top_heights
+from glassslam.volume.projection import Band, project, project_bands, top_heights
 
 Image = NDArray[np.uint8]
 
@@ -92,7 +93,9 @@ def write_slices(tree: Octree, path: str | Path, band: Band | None = None) -> Pa
     if not low[2] < high[2]:
         raise OutputError(*_EMPTY)
     whole = band or (float(low[2]), float(high[2]))
-    panels = [_panel(tree, part) for part in slice_bands(tree, band) or [whole]]
+    bands = slice_bands(tree, band) or [whole]
+    grids = project_bands(tree, bands)
+    panels = [_panel(grid, part, tree.clamp.threshold) for grid, part in zip(grids, bands, strict=True)]
     columns = math.ceil(math.sqrt(len(panels)))
     blank = np.full_like(panels[0], 255)
     panels += [blank] * (-len(panels) % columns)
@@ -114,11 +117,10 @@ def slice_bands(tree: Octree, band: Band | None = None) -> list[Band]:
     return [(float(k * tree.resolution), float((k + thick) * tree.resolution)) for k in starts]
 
 
-def _panel(tree: Octree, part: Band) -> Image:
-    probability = project(tree, part).probability
-    known = np.zeros(probability.shape, dtype=np.uint8)
-    known[probability < tree.clamp.threshold] = 1
-    known[probability >= tree.clamp.threshold] = 2
+def _panel(grid: OccupancyMap, part: Band, threshold: float) -> Image:
+    known = np.zeros(grid.probability.shape, dtype=np.uint8)
+    known[grid.probability < threshold] = 1
+    known[grid.probability >= threshold] = 2
     shade = _SHADES[_shrunk(known, math.ceil(max(known.shape) / _LARGEST_SLICE))]
     picture = _enlarged(np.repeat(shade[::-1, :, None], 3, axis=2), _zoom(shade.shape, _READABLE_SLICE))
     framed = _bordered(picture, top=22, side=_GAP // 2)

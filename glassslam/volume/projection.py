@@ -1,6 +1,7 @@
 """A volume seen from above: the fused 2D map, slices, and the height of what is highest."""
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -41,20 +42,33 @@ def project(tree: Octree, band: Band, rule: Rule = "max") -> OccupancyMap:
     GridError
         The band is empty or not finite, there is no such rule, or the map would be too large for memory.
     """
+    return next(project_bands(tree, [band], rule))
+
+
+def project_bands(tree: Octree, bands: Iterable[Band], rule: Rule = "max") -> Iterator[OccupancyMap]:
+    """`project` for several bands, one after the other: the voxels are gathered once.
+
+    Raises
+    ------
+    GridError
+        As by `project`.
+    """
     if rule not in get_args(Rule):
         raise GridError(f"there is no rule {rule!r} of projection", f"known: {', '.join(get_args(Rule))}")
-    bottom, top = band_keys(tree, band)
     leaves, low, size = tree.leaves(), *_extent(tree)
-    largest = np.full(size, -np.inf, dtype=np.float32)
-    smallest = np.full(size, np.inf, dtype=np.float32)
-    total, count = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.int32)
-    kernels.project_leaves(
-        leaves.keys, leaves.edges, leaves.log_odds, low, bottom, top, largest, smallest, total, count
-    )
-    decisive = np.where(largest >= tree.clamp.occupied, largest, smallest)
-    value = decisive if rule == "max" else total / np.maximum(count, 1)
-    probability = np.where(count > 0, probabilities(value), np.float32(np.nan))
-    return OccupancyMap(probability, tree.resolution, _corner(tree, low))
+    keys, edges = leaves.keys, leaves.edges
+    for band in bands:
+        bottom, top = band_keys(tree, band)
+        largest = np.full(size, -np.inf, dtype=np.float32)
+        smallest = np.full(size, np.inf, dtype=np.float32)
+        total, count = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.int32)
+        kernels.project_leaves(
+            keys, edges, leaves.log_odds, low, bottom, top, largest, smallest, total, count
+        )
+        decisive = np.where(largest >= tree.clamp.occupied, largest, smallest)
+        value = decisive if rule == "max" else total / np.maximum(count, 1)
+        probability = np.where(count > 0, probabilities(value), np.float32(np.nan))
+        yield OccupancyMap(probability, tree.resolution, _corner(tree, low))
 
 
 def band_keys(tree: Octree, band: Band) -> tuple[int, int]:
@@ -68,11 +82,9 @@ def band_keys(tree: Octree, band: Band) -> tuple[int, int]:
     low, high = band
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise GridError(f"there is no height from {low:g} to {high:g} m", "give the lower one first")
-    # A bound meant to lie between two layers may miss by the last bit of a division.
-    return (
-        math.floor(low / tree.resolution + 1e-6) + CENTRE,
-        math.ceil(high / tree.resolution - 1e-6) + CENTRE,
-    )
+    # A bound meant to lie between two layers may miss by the last bit of a division, or lie beyond the tree.
+    bottom, top = (min(max(height / tree.resolution, -CENTRE), CENTRE) for height in band)
+    return math.floor(bottom + 1e-6) + CENTRE, math.ceil(top - 1e-6) + CENTRE
 
 
 def top_heights(tree: Octree, leaves: Leaves) -> tuple[Float32Array, tuple[float, float]]:

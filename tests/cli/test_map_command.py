@@ -14,6 +14,7 @@ from glassslam.errors import RecordingError
 from glassslam.outputs import RESULT_FILES, Usage, build_report
 from glassslam.records import LaserScan, RecordingInfo
 from glassslam.simulation.rosbag1 import write_rosbag1
+from glassslam.slam.result import Degeneracy
 
 
 def test_results_are_written_and_told(asked_runs, tmp_path, capsys):
@@ -212,3 +213,17 @@ def test_on_a_terminal_the_bar_tells_the_speed(monkeypatch):
         progress(api.Progress("mapping", 50, 30.0, info))
     assert "50%" in terminal.getvalue()
     assert "x real time" in terminal.getvalue()
+
+
+def test_the_summary_counts_uncertain_stretches_by_kind(tiny_result):
+    def stretch(kind, length):
+        return Degeneracy(kind, 0, 1, 0.0, 1.0, (0.0, 0.0), (1.0, 0.0), length, "")
+
+    assert "uncertain" not in dict(summary_rows(build_report(tiny_result)))
+    tiny_result.statistics.degeneracies = [
+        stretch("lost", 0.0),
+        stretch("featureless", 9.0),
+        stretch("featureless", 5.5),
+    ]
+    rows = dict(summary_rows(build_report(tiny_result)))
+    assert rows["uncertain"] == "1 x lost, 2 x featureless (14.5 m); see report"

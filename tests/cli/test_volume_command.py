@@ -1,11 +1,17 @@
 """`glassslam volume`: what it reads, writes and says."""
 
 import json
+import time
+from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from glassslam.cli.app import main
+from glassslam.cli.volume import _followed
+from glassslam.config import Config
 from glassslam.outputs import read_map
+from glassslam.records import LaserScan, PointSet, RecordingInfo
 from glassslam.simulation import Scene, simulate, write_recording
 from glassslam.volume.storage import load_volume
 
@@ -19,6 +25,7 @@ ROOM = {
     ],
     "drive": {"waypoints": [{"at": [2, 3]}, {"at": [4, 3]}]},
     "ultrasonic": {},
+    "laser_height": 0.35,
 }
 FILES = [
     "volume.npz",
@@ -132,3 +139,96 @@ def test_a_recording_without_points_is_a_volume_of_the_lidar(tmp_path, capsys):
     words = ["volume", str(bag), "--trajectory", f"{bag}.truth.tum", "-o", str(tmp_path / "run")]
     assert main(words) == 0
     assert "0 points of 0 pings" in capsys.readouterr().out
+
+
+def made(bag, tmp_path, capsys, *words):
+    """Summary of a volume along the true trajectory."""
+    target = str(tmp_path / "run")
+    command = ["volume", str(bag), "--trajectory", truth(bag), "-o", target, "--overwrite", "--json"]
+    assert main([*command, "--resolution", "0.2", *words]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_the_height_of_the_lidar_is_recorded_or_said(bag, tmp_path, capsys):
+    assert made(bag, tmp_path, capsys)["lidar_height"] == pytest.approx(0.35)
+    assert made(bag, tmp_path, capsys, "--lidar-height", "0.9")["lidar_height"] == 0.9
+    assert made(bag, tmp_path, capsys, "--set", "volume.lidar_height=0.8")["lidar_height"] == 0.8
+
+
+def test_parameters_come_from_the_configuration_and_options_go_before_it(bag, tmp_path, capsys):
+    file = tmp_path / "mine.yaml"
+    file.write_text("volume: {lidar_height: 0.7, lidar_max_range: 1.5, resolution: 0.5}\n", encoding="utf-8")
+    usual, mine = made(bag, tmp_path, capsys), made(bag, tmp_path, capsys, "--config", str(file))
+    assert (mine["lidar_height"], mine["resolution"]) == (0.7, 0.2)
+    assert mine["occupied_voxels"] < usual["occupied_voxels"]
+    said = made(bag, tmp_path, capsys, "--config", str(file), "--set", "volume.resolution=0.4")
+    assert said["resolution"] == 0.2
+
+
+def test_what_the_lidar_is_believed_is_configured_as_for_map(bag, tmp_path, capsys):
+    near = made(bag, tmp_path, capsys, "--set", "sensor.max_range=1.0", "--band", "0.3", "0.4")
+    assert near["occupied_voxels"] < made(bag, tmp_path, capsys)["occupied_voxels"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            ["--set", "volume.pool=mean"],
+            "--set: volume.pool: Input should be 'bayes', 'iop', 'lop' or 'liop'",
+        ),
+        (["--set", "volume.heigth=1"], "--set: unknown parameter 'volume.heigth'"),
+        (["--band", "1", "nan"], "--band 1 nan: no height lies between"),
+        (
+            ["--points-topic", "/other"],
+            "points topic /other is not in the recording; candidates: /ultrasonic",
+        ),
+        (["--laser-pose", "1,2"], "--laser-pose 1,2: not three numbers x,y,yaw"),
+    ],
+)
+def test_wrong_parameters_are_refused(bag, tmp_path, capsys, words, text):
+    assert main(["volume", str(bag), "-o", str(tmp_path / "run"), *words]) == 2
+    assert text in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("option", ["--points-topic", "--sonar-topic"])
+def test_the_points_can_be_named(bag, tmp_path, capsys, option):
+    assert made(bag, tmp_path, capsys, option, "ultrasonic")["point_sets"] > 50
+    assert made(bag, tmp_path, capsys, option, "none")["point_sets"] == 0
+
+
+def test_it_can_be_quiet(bag, tmp_path, capsys):
+    words = ["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")]
+    assert main([*words, "--resolution", "0.2", "--quiet"]) == 0
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "")
+    assert (tmp_path / "run" / "volume.npz").is_file()
+
+
+def test_the_defaults_of_the_help_are_those_of_the_configuration(capsys):
+    main(["volume", "--help"])
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    usual = Config().volume
+    for default in (
+        f"{usual.resolution:g}",
+        f"{usual.band_low:g} {usual.band_high:g}",
+        usual.pool,
+        usual.projection,
+    ):
+        assert f"[default: {default}]" in text
+
+
+def test_progress_is_told_now_and_then_and_no_record_is_lost(monkeypatch):
+    clock = iter(0.03 * k for k in range(1000))
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    ranges = np.ones(3, np.float32)
+    scans = [LaserScan(k, ranges, 0.0, 0.1, 0.0, 9.0, record_stamp=100.0 + k) for k in range(20)]
+    records = [*scans, PointSet(20.0, np.zeros((1, 3), np.float32), np.zeros(3), 120.0)]
+    told = []
+    info = RecordingInfo(("run.bag",), "rosbag1", 20.0, 20)
+    assert list(_followed(records, info, told.append)) == records
+    assert 2 < len(told) < 21
+    assert (told[0].scans, told[0].recorded_seconds, told[0].info) == (1, 0.0, info)
+    assert all(a.scans < b.scans and a.recorded_seconds < b.recorded_seconds for a, b in pairwise(told))
+    assert list(_followed(records, info, None)) == records

@@ -20,7 +20,7 @@ from glassslam.outputs import Stopwatch, Usage, build_report, html_pictures, wri
 from glassslam.outputs.html_page import escaped, facts, figures, page
 from glassslam.outputs.html_report import write_html_report
 from glassslam.records import Damage, RecordingInfo, SonarRing
-from glassslam.slam.result import SonarMaps, StageTime
+from glassslam.slam.result import Degeneracy, SonarMaps, StageTime
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -442,3 +442,38 @@ def test_sections_come_in_the_order_of_what_matters(tiny_result, tmp_path):
     order = ["Warnings", "Map", "Run", "Glass", "Sonar", "Recording", "Time and memory", "Configuration"]
     places = [headings.index(name) for name in order]
     assert all(first < second for first, second in pairwise(places))
+
+
+def stretch(kind="featureless", text="9.0 m along bare walls"):
+    start = 1031745824.658
+    return Degeneracy(kind, 0, 1, start, start + 0.44, (1.0, -2.04), (10.0, -2.0), 9.0, text)
+
+
+def test_uncertain_stretches_are_told_with_time_and_place(tiny_result, tmp_path):
+    tiny_result.statistics.degeneracies = [stretch(), stretch("lost", "found again once")]
+    tiny_result.statistics.tracking = {"searches_taken": 7, "stretches": 1}
+    read = Page(html(tiny_result, tmp_path))
+    assert "Uncertain stretches" in read.said("h2")
+    assert read.facts()["featureless"] == [
+        "0.0 to 0.4 s, (1.0, -2.0) to (10.0, -2.0), 9.0 m: 9.0 m along bare walls"
+    ]
+    assert read.facts()["lost"][0].endswith("found again once")
+    assert read.facts()["searches taken"] == ["7"]
+
+
+def test_a_run_without_any_has_no_such_section(tiny_result, tmp_path):
+    assert "Uncertain stretches" not in html(tiny_result, tmp_path)
+
+
+def test_very_many_stretches_are_cut(tiny_result, tmp_path):
+    tiny_result.statistics.degeneracies = [stretch(("lost", "poor fit")[k % 2]) for k in range(450)]
+    read = Page(html(tiny_result, tmp_path))
+    assert read.facts()["more"] == ["250, see report.json"]
+    assert sum("bare walls" in text for text in read.said("td")) == 200
+
+
+def test_words_of_a_stretch_stay_text(tiny_result, tmp_path):
+    tiny_result.statistics.degeneracies = [stretch("<b>", "</table><script>")]
+    text = html(tiny_result, tmp_path)
+    assert "<script>" not in text
+    assert "&lt;b&gt;" in text

@@ -25,6 +25,7 @@ from glassslam.outputs import (
     write_results,
 )
 from glassslam.records import SonarRing
+from glassslam.slam.result import Degeneracy
 
 
 def names(folder):
@@ -187,3 +188,27 @@ def test_a_folder_that_cannot_be_written_is_found_out_first():
 def test_config_is_plain_yaml(tiny_result, tmp_path):
     write_results(tiny_result, tmp_path / "run")
     assert yaml.safe_load((tmp_path / "run/config.yaml").read_text())["sensor"]["max_range"] == 30.0
+
+
+def test_the_report_tells_where_a_run_was_uncertain(tiny_result):
+    first = float(tiny_result.trajectory.stamps[0])
+    tiny_result.statistics.degeneracies = [
+        Degeneracy("silence", 0, 1, first + 0.1, first + 0.3, (1.0, 2.0), (3.0, float("nan")), 4.5, "no scan")
+    ]
+    tiny_result.statistics.tracking = {"coasted": 3, "stretches": 2}
+    report = build_report(tiny_result)
+    assert report["tracking"] == {"coasted": 3, "stretches": 2}
+    (one,) = report["degeneracies"]
+    assert one.pop("start_after_seconds") == pytest.approx(0.1, abs=1e-6)
+    assert one.pop("end_after_seconds") == pytest.approx(0.3, abs=1e-6)
+    assert one == {
+        "kind": "silence",
+        "first_scan": 0,
+        "last_scan": 1,
+        "start": first + 0.1,
+        "end": first + 0.3,
+        "start_place": [1.0, 2.0],
+        "end_place": [3.0, None],
+        "length_m": 4.5,
+        "text": "no scan",
+    }

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import yaml
 from tiny_scene import SQUARE, scene
 
 from glassslam.errors import ConfigError
@@ -139,3 +140,23 @@ def test_a_scene_is_found_by_name_or_by_path(tmp_path):
 
 def test_the_world_of_these_tests_is_a_room():
     assert scene().walls[0].points == tuple(tuple(p) for p in SQUARE)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"at": [9000.0, 1.0], "speed": 10.0}, "the plan covers 9000 x 500 m"),
+        ({"at": [1e6, 1.0]}, "drive.waypoints.1.at.0: Input should be less than or equal to 10000"),
+        ({"speed": 1e-7}, "drive: the drive takes "),
+        ({"stop": 1e6}, "drive: the drive takes 277.8 h, at most are 4 h"),
+    ],
+)
+def test_a_scene_beyond_all_memory_and_patience_is_refused(tmp_path, change, message):
+    path = tmp_path / "scene.yaml"
+    walls = [{"name": "w", "material": "plaster", "points": [[0, 0], [6, 0], [6, 500]]}]
+    drive = {"waypoints": [{"at": [1.0, 1.0]}, {"at": [2.0, 1.0], **change}]}
+    path.write_text(yaml.safe_dump({"name": "s", "walls": walls, "drive": drive}))
+    with pytest.raises(ConfigError) as caught:
+        Scene.load(path)
+    assert message in caught.value.message
+    assert "\n" not in caught.value.message

@@ -19,6 +19,7 @@ from glassslam.simulation.scene import UltrasonicMount
 from glassslam.simulation.solids import build_surfaces
 from glassslam.simulation.ultrasonic import TS_ALPHA, Ear
 from glassslam.simulation.ultrasonic_kernels import Surfaces, answer_chance, listen, meet
+from glassslam.sources import open_recording
 
 MOUNT = {"pose": [0.1, 0.05, 0.3], "height": 0.4}
 
@@ -241,6 +242,17 @@ def test_a_thing_must_have_a_height():
             scene().model_dump() | {"posts": [{"name": "p", "material": "wood", "radius": 1, "at": [[0, 0]],
                                                "z_low": 2, "z_high": 1}]}
         )  # fmt: skip
+
+
+def test_pings_tell_where_the_sensor_looks(tmp_path):
+    turned = scene(ultrasonic={"pose": [0.1, 0.0, 0.5]})
+    simulation = simulate(turned, "rplidar", seed=5)
+    pings = [record for record in simulation.records() if isinstance(record, PointSet)]
+    assert {ping.axis for ping in pings} == {(math.cos(0.5), math.sin(0.5), 0.0)}
+    written = write_recording(simulation, tmp_path / "turned.bag")
+    recorded = [r for r in open_recording(written.bag).records() if isinstance(r, PointSet)]
+    assert len(recorded) == len(pings)
+    np.testing.assert_allclose(recorded[0].axis, pings[0].axis, atol=1e-9)
 
 
 def test_the_bag_holds_the_points_in_the_frame_of_the_sensor(tmp_path):

@@ -39,6 +39,7 @@ def one_line(error):
     [
         (b"", "is empty"),
         (b"%PDF-1.4 something else", "is no recording known here"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + b"\x00" * 500, "is no recording known here"),
         (b"\x00\x01\x02" * 1000, "is no recording known here"),
         (b"FLASER 1 \x00\x00 1.0", "is no recording known here"),
         (b"\x1f\x8b\x08\x00 no gzip at all", "is no recording known here"),

@@ -103,6 +103,20 @@ def test_a_cut_mcap_is_read_up_to_the_cut(tmp_path, long_mcap, share):
     assert damage.last_stamp > damage.first_stamp == pytest.approx(records[-1][1], abs=0.11)
 
 
+def test_an_mcap_that_grows_is_read_to_its_size_at_opening(tmp_path, long_mcap):
+    path = tmp_path / "run.mcap"
+    end = mcap_chunks(long_mcap)[3].end
+    path.write_bytes(long_mcap[:end])
+    before, _ = read(path)
+    recording = open_recording(path)
+    stream = recording.records()
+    next(stream)
+    with path.open("ab") as file:
+        file.write(long_mcap[end:])
+    assert 1 + sum(1 for _ in stream) == len(before)
+    assert len(before) < len(LONG) == len(read(path)[0])
+
+
 def test_an_mcap_without_index_is_not_damaged(tmp_path, long_mcap):
     """Written without a summary: complete, if slower to open."""
     path = tmp_path / "run.mcap"

@@ -79,6 +79,13 @@ def test_named_points_may_be_dense_and_of_equal_number(ros1):
     assert ros1(*DRIVE, *ring_clouds("/clouds"), points_topic="/clouds").info.points_topics == ("/clouds",)
 
 
+@pytest.mark.parametrize("topic", ["/cloud_radar_rawtarget", "/Lidar/clusters", "/camera/depth/corners"])
+def test_points_named_after_another_sensor_must_be_named(ros1, topic):
+    assert ros1(*DRIVE, *pings(topic=topic)).info.sonar_topics == ()
+    assert ros1(*DRIVE, *pings(topic=f"{topic}/ultrasonic")).info.points_topics == (f"{topic}/ultrasonic",)
+    assert ros1(*DRIVE, *pings(topic=topic), points_topic=topic).info.points_topics == (topic,)
+
+
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
@@ -121,6 +128,21 @@ def test_the_sensor_looks_where_its_frame_looks(ros1, rotation, axis):
     mount = tf(0.0, "base_link", "ear", (0.1, 0.0, 0.4), rotation, topic="/tf_static")
     recording = ros1(mount, *DRIVE, *pings(frame="ear"))
     np.testing.assert_allclose(only(recording, PointSet)[0].axis, axis, atol=1e-9)
+
+
+@pytest.mark.parametrize("far", [1e30, 1e300])
+def test_a_sensor_out_of_all_bounds_is_read_without_a_word(ros1, far):
+    mount = tf(0.0, "base_link", "ear", (far, 0.0, 0.4), topic="/tf_static")
+    recording = ros1(mount, *DRIVE, *pings(frame="ear"), *ring_clouds())
+    found = only(recording, PointSet)
+    assert [len(record.points) for record in found] == [1, 2, 3, 1, 2, 3]
+    assert found[0].origin[0] == far
+
+
+def test_echoes_that_are_not_finite_are_left_out_without_a_word(ros1):
+    odd = [[math.inf, 0.0, 0.0], [1.0, 0.0, 0.5], [0.0, -math.inf, math.nan]]
+    recording = ros1(*DRIVE, cloud2(0.1, odd), cloud2(0.2, odd[:2]))
+    assert [record.points.tolist() for record in only(recording, PointSet)] == [[[1.0, 0.0, 0.5]]] * 2
 
 
 def test_without_a_transform_the_sensor_looks_ahead(ros1):

@@ -115,3 +115,11 @@ def test_toposens_points(data_dir, name, count, points):
     assert 0.2 < distances.min() < distances.max() < 6.0
     assert sonar.ring is None
     assert "toposens" in sonar.warnings[0]
+
+
+def test_a_radar_is_no_sonar(data_dir):
+    bag = data_dir / "sick" / "rms_1xxx_lms_1xx_movement_off.bag"
+    if not bag.is_file():
+        pytest.skip(f"{bag} is absent")
+    info = open_recording(bag).info
+    assert (info.sonar_ring, info.sonar_topics, info.points_topics) == (None, (), ())

@@ -218,3 +218,35 @@ def test_the_run_that_was_joined_stays_as_it_was(run):
     assert (result.statistics.stages, result.statistics.warnings) == before
     assert joined.statistics.stages["volume"].wall > 0.0
     assert (result.volume, joined.volume is None) == (None, False)
+
+
+def test_a_volume_in_which_nothing_can_be_placed_costs_a_warning_and_not_the_map(run):
+    result = run([node(0, 0.0, (2.0, 0.0))])
+    far = ping(0.0, (1.0, 0.0, 0.5), origin=(1e9, 0.0, 0.0))
+    joined = VolumeListener(CONFIG, [far], laser_height=1e9).joined(result)
+    assert joined.volume is None
+    assert joined.statistics.warnings[-1] == (
+        "there is no volume: nothing of it could be placed (1 x scan too far from the origin of the volume,"
+        " 1 x point set too far from the origin of the volume)"
+    )
+
+
+@pytest.mark.parametrize("odd", [1e9, 1e30, 3e38, 1e300, math.inf, math.nan])
+def test_points_and_places_out_of_all_bounds_lose_nothing_else(run, odd):
+    result = run([node(0, 0.0, (2.01, 0.01))])
+    sound = ping(0.0, (1.01, 0.01, 0.81))
+    places = [
+        ping(0.0, (1.0, 0.0, 0.5), origin=(odd, 0.0, 0.0)),
+        ping(0.0, (1.0, 0.0, 0.5), origin=(0.0, 0.0, -odd)),
+    ]
+    points = [(x, 0.0, z) for x, z in ((odd, 0.5), (0.5, odd)) if not 3e38 < odd < math.inf]
+    made = volume(result, sound, *places, ping(0.0, *points))
+    assert value(made.tree, 1.01, 0.01, 0.81) == pytest.approx(HIT)
+    assert value(made.tree, 2.01, 0.01, 0.22) == pytest.approx(HIT)
+
+
+@pytest.mark.parametrize("height", [1e9, 1e300])
+def test_a_height_of_the_lidar_out_of_all_bounds_leaves_the_points(run, height):
+    made = volume(run([node(0, 0.0, (2.01, 0.01))]), ping(0.0, (1.01, 0.01, 0.81)), height=height)
+    assert value(made.tree, 1.01, 0.01, 0.81) == pytest.approx(HIT)
+    assert made.dropped == {"scan too far from the origin of the volume": 1}

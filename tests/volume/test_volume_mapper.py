@@ -110,6 +110,13 @@ def test_a_sensor_that_looks_back_sees_what_is_behind():
     assert value(volume.ultrasonic, -1.0, 0.0, 0.5) == pytest.approx(HIT)
 
 
+@pytest.mark.parametrize("yaw", [0.4, 1.3, 2.9])
+def test_points_on_the_border_of_the_field_of_view_are_inside(yaw):
+    side = 3.9 * np.array([[-math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]]) + 1.0
+    border = PointSet(0.0, side.astype(np.float32), np.ones(3), axis=(math.cos(yaw), math.sin(yaw), 0.0))
+    assert build_volume([border], STANDING).counts["points"] == 2
+
+
 def test_an_echo_beyond_four_metres_is_free_space():
     volume = build_volume([points([4.5, 0.0, 0.2])], STANDING)
     assert len(volume.ultrasonic.occupied()) == 0

@@ -9,7 +9,7 @@ from volume_worlds import drawing_of, drawn_tree
 from glassslam.errors import GridError
 from glassslam.volume import projection
 from glassslam.volume.octree import CENTRE, Octree, encode
-from glassslam.volume.projection import band_keys, project, top_heights
+from glassslam.volume.projection import band_keys, project, project_bands, top_heights
 from glassslam.volume.projection_kernels import highest, project_leaves
 
 ROOM = [
@@ -128,3 +128,23 @@ def test_a_map_too_large_for_memory_is_refused_before_it_is_made(monkeypatch):
     assert error.value.hint == "raise volume.resolution"
     monkeypatch.setattr(projection, "MOST_CELLS", 12)
     assert project(drawn_tree(["....\n....\n...."]), (0.0, 1.0)).probability.shape == (3, 4)
+
+
+@pytest.mark.parametrize("rule", ["max", "pool"])
+def test_several_bands_are_projected_as_each_alone(rule):
+    tree = drawn_tree(ROOM)
+    bands = [(0.0, 0.5), (0.5, 1.0), (0.0, 1.5)]
+    together = list(project_bands(tree, bands, rule))
+    assert len(together) == 3
+    for band, grid in zip(bands, together, strict=True):
+        alone = project(tree, band, rule)
+        np.testing.assert_array_equal(grid.probability, alone.probability)
+        assert grid.origin == alone.origin
+
+
+def test_a_band_may_reach_beyond_the_tree():
+    tree = drawn_tree(ROOM)
+    everything = project(tree, (0.0, 1.5)).probability
+    for far in (1e5, 1e300, 1.7e308):
+        np.testing.assert_array_equal(project(tree, (-far, far)).probability, everything)
+        assert np.isnan(project(tree, (far / 2, far)).probability).all()
