@@ -1,7 +1,8 @@
-"""Why the rows of the fusion table stand as they do: one experiment for each question, on the hallway of pi-map.
+"""Why the rows of the fusion table stand as they do: experiments on the hallway of pi-map.
 
 weights     what the probabilities of the lidar map do to the gain of Revisit Scan Fusion
 regions     where the mean square error comes from, and what a perfect sonar map could mend of it
+revisit     Revisit Scan Fusion with one thing changed at a time
 truth       what the bow of the map against the straight plan costs, even a perfect map
 poses       why FG comes last: poses of the nodes alone, with and without correction, with and without filling
 algorithms  what the sonar maps paste onto the lidar map: how many cells, and how many of them on a wall
@@ -16,11 +17,12 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from fusion_regions import REGIONS, by_region, compared_cells, perfect_sonar_map
 from fusion_rows import (
     ALGORITHMS,
-    CARTOGRAPHER,
     LIDAR,
     OURS,
     RSF_ALL,
@@ -29,86 +31,83 @@ from fusion_rows import (
     Recorded,
     Row,
     changed,
+    finished,
     hallway,
     mapped,
 )
 from fusion_table import true_hallway
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from scipy import ndimage
 
 from glassslam.errors import GlassSlamError
-from glassslam.evaluation import evaluate_image
 from glassslam.evaluation.image import PIMAP_UNKNOWN
-from glassslam.evaluation.image_cells import classes_of, cut_out, drawn_anew, region_of
+from glassslam.evaluation.image_cells import PANE, SOLID
+from glassslam.finished import FinishedRun
 from glassslam.fusion.fuse import fuse
-from glassslam.geometry import inverse, transform_points
-from glassslam.records import FloatArray, RangeRing
+from glassslam.records import Trajectory
 from glassslam.slam.result import OccupancyMap
-from glassslam.slam.trajectory import PoseTracks, Trajectory
+from glassslam.slam.trajectory import PoseTracks
 from glassslam.sonar.mapping import build_sonar_map
 from glassslam.sonar.poses import PoseKind
 from glassslam.sonar.sweeps import SonarSweeps, placed_sweeps
-from glassslam.sources import SourceOptions, open_recording
 
 WEIGHTS = ((0.8, 0.33), (0.7, 0.4), (0.65, 0.4), (0.6, 0.45), (0.599, 0.48), (0.55, 0.49))
 _GREYS = np.array([PIMAP_UNKNOWN, 254, 0, 0], dtype=np.int64)
-_UNKNOWN, _FREE, _WALL, _GLASS = range(4)
 _PERFECT = "RSF+All, perfect sonar map"
 
 
-def weights(of: Recorded) -> Table:
+def weights(of: Recorded, run: FinishedRun) -> Table:
     """Rows of three maps by the probabilities that the lidar map is drawn with."""
     table = _table(
         "lidar map drawn with", "hit, miss", "lidar", "RSF+All", "ours", "RSF+All gains: SSIM, NCC"
     )
     for hit, miss in WEIGHTS:
-        one = mapped(of, (f"map.hit_probability={hit}", f"map.miss_probability={miss}"))
+        one = mapped(of, run, (f"map.hit_probability={hit}", f"map.miss_probability={miss}"))
         lidar, rsf, ours = (one.row(grid) for grid in (one.lidar, *_fused(one, (RSF_ALL, OURS))))
         gains = f"{rsf.errors.ssim - lidar.errors.ssim:+.3f} {rsf.errors.ncc - lidar.errors.ncc:+.3f}"
         table.add_row(f"{hit}, {miss}", *(_figures(row) for row in (lidar, rsf, ours)), gains)
     return table
 
 
-def regions(of: Recorded) -> Table:
+def regions(of: Recorded, run: FinishedRun) -> Table:
     """Shares of the mean square error by where the truth, bowed, has what; and a perfect sonar map."""
-    one = mapped(of, bowed=True)
-    sweeps = _sweeps(of, _tracks(one), "FGfit")
+    one = mapped(of, run, bowed=True)
+    sweeps = _sweeps(run, run.result().tracks, "FGfit")
     maps = {LIDAR: one.lidar, **dict(zip((RSF_ALL, OURS), _fused(one, (RSF_ALL, OURS)), strict=True))}
-    maps[_PERFECT] = fuse("rsf_all", one.lidar, _perfect(one), sweeps, one.base.fusion).map
-    table = _table(
-        "mean square error by region (truth bowed as the map is)", "map", "all", *_REGIONS, "image"
-    )
+    maps[_PERFECT] = fuse("rsf_all", one.lidar, perfect_sonar_map(one), sweeps, one.base.fusion).map
+    table = _table("mean square error by region (truth bowed as the map is)", "map", "all", *REGIONS, "image")
     for name, grid in maps.items():
-        mine, true, places = _cells(one, grid)
+        mine, true, places = compared_cells(one, grid)
         error = (_GREYS[mine] - _GREYS[true]) ** 2 / mine.size
-        parts = (f"{error[inside].sum():.0f}" for inside in _by_region(true, places))
+        parts = (f"{error[inside].sum():.0f}" for inside in by_region(true, places))
         table.add_row(name, f"{error.sum():.0f}", *parts, _figures(one.row(grid)))
     return table
 
 
-_REGIONS = ("2 cells from walls", "3 cells from glass", "free inside", "behind the long glass", "elsewhere")
+def revisit(of: Recorded, run: FinishedRun) -> Table:
+    """Revisit Scan Fusion with other arcs, another threshold for glass, other sonars and other sonar maps."""
+    one = mapped(of, run)
+    rsf: dict[str, Any] = {"method": "rsf_all"}
+    variants: dict[str, dict[str, Any]] = {
+        "as it is": {},
+        "arcs twice as thick": {"arc_thickness": 0.05},
+        "glass from a gap of 0.25 m": {"fusion": {"glass_gap": 0.25}},
+        "two sonars": {"fusion": {"sonars": "sides"}},
+        "two sonars, a gap of 0.25 m": {"fusion": {"sonars": "sides", "glass_gap": 0.25}},
+        "a cone of 30 deg": {"beam_width_deg": 30.0},
+        **{f"sonar map by {name}": {"algorithm": name} for name in ALGORITHMS[:-1]},
+    }
+    table = _table("RSF+All", "variant", "MSE SSIM NCC mean", "saved: MSE SSIM NCC mean")
+    for name, variant in variants.items():
+        grid = one.fused({**variant, "fusion": {**rsf, **variant.get("fusion", {})}})
+        table.add_row(name, _figures(one.row(grid)), _figures(one.row(grid), saved=True))
+    return table
 
 
-def _by_region(true: NDArray[np.uint8], places: FloatArray) -> list[NDArray[np.bool_]]:
-    """Cells that belong to each of `_REGIONS`, the first that fits."""
-    x, y = places[..., 0], places[..., 1]
-    wall = ndimage.distance_transform_edt(true != _WALL) < 2.3
-    glass = ndimage.distance_transform_edt(true != _GLASS) < 3.3
-    behind = (true == _UNKNOWN) & (x > 3.5) & (x < 28.6) & (y > 1.2)
-    masks = [wall, glass, true == _FREE, behind, np.ones(true.shape, dtype=np.bool_)]
-    taken = np.zeros(true.shape, dtype=np.bool_)
-    out = []
-    for mask in masks:
-        out.append(mask & ~taken)
-        taken |= mask
-    return out
-
-
-def truth(of: Recorded) -> Table:
-    """The straight plan as truth and the plan bowed as the walls of the map, for three maps and for the plan."""
-    straight, bowed = mapped(of), mapped(of, bowed=True)
+def truth(of: Recorded, run: FinishedRun) -> Table:
+    """Three maps, and the plan bowed as they are, against the straight plan and against the bowed one."""
+    straight, bowed = mapped(of, run), mapped(of, run, bowed=True)
     table = _table("truth", "map", "straight", "bowed as the map")
     maps = {
         LIDAR: straight.lidar,
@@ -116,19 +115,17 @@ def truth(of: Recorded) -> Table:
     }
     for name, grid in maps.items():
         table.add_row(name, _figures(straight.row(grid)), _figures(bowed.row(grid)))
-    own = (0.0, 0.0, 0.0)
-    errors = [
-        evaluate_image(bowed.truth.grid, one.truth.grid, map_from_truth=own, unknown_grey=PIMAP_UNKNOWN)
-        for one in (straight, bowed)
-    ]
-    table.add_row("the bowed plan itself", *(f"{e.mse:.0f} {e.ssim:.3f} {e.ncc:.3f}" for e in errors))
+    itself = bowed.truth.grid
+    rows = [replace(one, motion=(0.0, 0.0, 0.0)).row(itself) for one in (straight, bowed)]
+    table.add_row("the bowed plan itself", *map(_figures, rows))
+    table.add_row("the same as saved", *(_figures(row, saved=True) for row in rows))
     return table
 
 
-def poses(of: Recorded) -> Table:
+def poses(of: Recorded, run: FinishedRun) -> Table:
     """Sonar maps pasted onto the lidar map by poses that differ in one thing at a time."""
-    one = mapped(of)
-    tracks = _tracks(one)
+    one = mapped(of, run)
+    tracks = run.result().tracks
     at_nodes = np.searchsorted(tracks.local.stamps, tracks.nodes.stamps)
     local = Trajectory(tracks.nodes.stamps, tracks.local.poses[at_nodes])
     drift = np.hypot(*(tracks.local.poses - tracks.final.poses)[:, :2].T).max()
@@ -139,11 +136,11 @@ def poses(of: Recorded) -> Table:
         "FG, between nodes": (replace(tracks, final=tracks.nodes), "FGfit"),
         "FGfit (between scans)": (tracks, "FGfit"),
     }
-    best = _sweeps(of, tracks, "FGfit")
+    best = _sweeps(run, tracks, "FGfit")
     title = f"poses; local and final ones are at most {drift:.1g} m apart"
     table = _table(title, "poses", "off FGfit: mean, largest (cm)", "MSE SSIM NCC mean")
     for name, (by, kind) in kinds.items():
-        sweeps = _sweeps(of, by, kind)
+        sweeps = _sweeps(run, by, kind)
         both, mine, theirs = np.intersect1d(sweeps.stamps, best.stamps, return_indices=True)
         off = 100.0 * np.hypot(*(sweeps.poses[mine, :2] - best.poses[theirs, :2]).T)
         pasted = fuse("attach", one.lidar, build_sonar_map(sweeps, one.base), None, one.base.fusion).map
@@ -151,12 +148,12 @@ def poses(of: Recorded) -> Table:
     return table
 
 
-def algorithms(of: Recorded) -> Table:
+def algorithms(of: Recorded, run: FinishedRun) -> Table:
     """What each algorithm pastes, with cones as they are and made thin."""
-    one = mapped(of, bowed=True)
-    sweeps = _sweeps(of, _tracks(one), "FGfit")
+    one = mapped(of, run, bowed=True)
+    sweeps = _sweeps(run, run.result().tracks, "FGfit")
     thin = {"beam_width_deg": 1.0, "arc_thickness": 0.01, "arc_growth": 0.0}
-    variants = [
+    variants: list[tuple[str, dict[str, Any]]] = [
         *((name, {"algorithm": name}) for name in ALGORITHMS),
         ("BFA, a cone of 30 deg", {"beam_width_deg": 30.0}),
         ("ICo, a cone of 1 deg", {"algorithm": "ICo", **thin}),
@@ -164,21 +161,34 @@ def algorithms(of: Recorded) -> Table:
         ("ICL that forgets nothing", {"algorithm": "ICL", "old_weight": 0.999, "new_weight": 0.999}),
         ("ICo that forgets nothing", {"algorithm": "ICo", "old_weight": 0.999, "new_weight": 0.999}),
     ]
-    before, true, _ = _cells(one, one.lidar)
-    distance = ndimage.distance_transform_edt(true < _WALL)
-    table = _table("cells pasted", "map", "all", "on a wall", "1 cell off", "farther", "MSE SSIM NCC mean")
+    before, true, _ = compared_cells(one, one.lidar)
+    distance = ndimage.distance_transform_edt(true < SOLID)
+    headings = (
+        "map",
+        "all",
+        "on a wall",
+        "1 cell off",
+        "farther",
+        "glass within 2 cells",
+        "MSE SSIM NCC mean",
+    )
+    table = _table("cells pasted", *headings)
     for name, update in variants:
         config = changed(one.base, update)
-        grid = fuse("attach", one.lidar, build_sonar_map(sweeps, config), None, config.fusion).map
-        pasted = (_cells(one, grid)[0] >= _WALL) & (before < _WALL)
+        heard = build_sonar_map(sweeps, config)
+        grid = fuse("attach", one.lidar, heard, None, config.fusion).map
+        alone = ndimage.distance_transform_edt(compared_cells(one, heard)[0] < SOLID)
+        shown = f"{100 * (alone[true == PANE] <= 2.0).mean():.0f} %"
+        pasted = (compared_cells(one, grid)[0] >= SOLID) & (before < SOLID)
         off = distance[pasted]
         counts = (off.size, (off == 0).sum(), ((off > 0) & (off < 1.5)).sum(), (off >= 1.5).sum())
-        table.add_row(name, *map(str, counts), _figures(one.row(grid)))
+        table.add_row(name, *map(str, counts), shown, _figures(one.row(grid)))
     return table
 
 
-EXPERIMENTS: dict[str, Callable[[Recorded], Table]] = {
-    "weights": weights, "regions": regions, "truth": truth, "poses": poses, "algorithms": algorithms,
+EXPERIMENTS: dict[str, Callable[[Recorded, FinishedRun], Table]] = {
+    "weights": weights, "regions": regions, "revisit": revisit, "truth": truth, "poses": poses,
+    "algorithms": algorithms,
 }  # fmt: skip
 
 
@@ -189,49 +199,20 @@ def _table(title: str, *headings: str) -> Table:
     return table
 
 
-def _figures(row: Row) -> str:
-    return f"{row.errors.mse:.0f} {row.errors.ssim:.3f} {row.errors.ncc:.3f} {row.mean:.3f}"
+def _figures(row: Row, *, saved: bool = False) -> str:
+    errors, mean = (row.saved, row.saved_mean) if saved else (row.errors, row.mean)
+    return f"{errors.mse:.0f} {errors.ssim:.3f} {errors.ncc:.3f} {mean:.3f}"
 
 
 def _fused(one: Mapped, names: Sequence[str]) -> list[OccupancyMap]:
     return [one.fused(VARIANTS[name]) for name in names]
 
 
-def _tracks(one: Mapped) -> PoseTracks:
-    return one.run.result().tracks
-
-
-def _sweeps(of: Recorded, tracks: PoseTracks, kind: PoseKind) -> SonarSweeps:
-    source = open_recording([of.bag], SourceOptions(sonar=of.sonar, laser_pose=of.laser_pose))
-    ring = source.info.sonar_ring
+def _sweeps(run: FinishedRun, tracks: PoseTracks, kind: PoseKind) -> SonarSweeps:
+    ring = run.facts.info.sonar_ring
     if ring is None:
-        raise GlassSlamError(f"{of.bag} holds no sonar")
-    records = [record for record in source.records() if isinstance(record, RangeRing)]
-    return placed_sweeps(records, ring, tracks, kind)
-
-
-def _perfect(one: Mapped) -> OccupancyMap:
-    """The truth as a map of sonars that make no mistake, in the cells of the lidar map."""
-    rows, columns = one.lidar.probability.shape
-    drawn = drawn_anew(
-        classes_of(one.truth.grid, None, "the truth"), one.truth.grid, np.array(one.motion),
-        one.lidar, np.zeros(2, dtype=np.int64), (rows, columns),
-    )  # fmt: skip
-    probability = np.where(drawn >= _WALL, 0.9, 0.1).astype(np.float32)
-    return replace(one.lidar, probability=probability)
-
-
-def _cells(one: Mapped, grid: OccupancyMap) -> tuple[NDArray[np.uint8], NDArray[np.uint8], FloatArray]:
-    """Classes of a map and of the truth in the region compared, and its places in the frame of the plan."""
-    motion = np.array(one.motion)
-    true_classes = classes_of(one.truth.grid, one.truth.glass, "the truth")
-    low, shape = region_of(grid, one.truth.grid, true_classes, motion)
-    mine = cut_out(classes_of(grid, None, "the map"), grid, low, shape)
-    true = drawn_anew(true_classes, one.truth.grid, motion, grid, low, shape)
-    rows, columns = np.indices(shape)
-    cells = np.stack((columns + low[0], rows + low[1]), axis=-1).reshape(-1, 2) + 0.5
-    places = transform_points(inverse(motion), np.asarray(grid.origin) + cells * grid.resolution)
-    return mine, true, places.reshape(*shape, 2)
+        raise GlassSlamError("the recording holds no sonar")
+    return placed_sweeps(run.sweeps, ring, tracks, kind)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -247,8 +228,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with tempfile.TemporaryDirectory() as scratch:
             one = hallway(words.data, true_hallway(Path(scratch)))
+            run = finished(one)
             for name in words.experiments or EXPERIMENTS:
-                Console(width=180).print(EXPERIMENTS[name](one))
+                Console(width=180).print(EXPERIMENTS[name](one, run))
     except GlassSlamError as error:
         print(f"error: {error.message}" + (f" ({error.hint})" if error.hint else ""), file=sys.stderr)
         return error.exit_code

@@ -11,12 +11,12 @@ from pimap_bow import bow_of
 from pimap_truth import PLAN, Plan, draw
 
 from glassslam.api import run_slam
-from glassslam.finished import FinishedRun
 from glassslam.cli.settings import resolve_config
 from glassslam.config import FusionConfig, SonarConfig
 from glassslam.errors import RecordingError
 from glassslam.evaluation import ImageErrors, align_maps, evaluate_image, read_glass_cells, read_map
 from glassslam.evaluation.image import PIMAP_UNKNOWN
+from glassslam.finished import FinishedRun
 from glassslam.simulation import Scene, TrueMap, find_scene, simulate, write_recording
 from glassslam.slam.result import OccupancyMap
 from glassslam.sources import SourceOptions
@@ -40,6 +40,7 @@ HALLWAY_LASER = (0.12, 0.0, 0.0)
 # the lidar map of pi-map is Cartographer's: 0.55 and 0.49 for a return and a ray through, and every scan
 # stands in two submaps, which the map that is published adds up (odds squared)
 CARTOGRAPHER = ("map.hit_probability=0.599", "map.miss_probability=0.48")
+DRAWN: dict[str, tuple[str, ...]] = {"drawn as in pi-map": CARTOGRAPHER, "drawn as by default": ()}
 
 LIDAR, OURS, RSF_GLASS, RSF_ALL = "lidar", "ours", "FGfit+RSF+Glass", "FGfit+RSF+All"
 # in pi-map beams without echo clear nothing; the other way is shown beside it
@@ -153,10 +154,30 @@ def simulated(number: int, folder: Path) -> Recorded:
     return Recorded(SCENES[number], bag, Path(f"{bag}.truth.map.yaml"), assignments=RING_BELIEFS)
 
 
-def mapped(of: Recorded, assignments: Sequence[str] = CARTOGRAPHER, *, bowed: bool = False) -> Mapped:
-    """Map a recording and lay its truth onto the map, once for all rows; `bowed` as its walls are."""
+def finished(of: Recorded, assignments: Sequence[str] = ()) -> FinishedRun:
+    """SLAM of a recording."""
     config = resolve_config(None, [*of.assignments, *assignments])
-    run = run_slam(of.bag, config, source_options=SourceOptions(sonar=of.sonar, laser_pose=of.laser_pose))
+    return run_slam(of.bag, config, source_options=SourceOptions(sonar=of.sonar, laser_pose=of.laser_pose))
+
+
+def mapped(
+    of: Recorded, run: FinishedRun, assignments: Sequence[str] = CARTOGRAPHER, *, bowed: bool = False
+) -> Mapped:
+    """Draw the maps of the lidar and lay the truth onto them, once for all rows; `bowed` as its walls are.
+
+    Parameters
+    ----------
+    of : Recorded
+        The recording.
+    run : FinishedRun
+        Its SLAM.
+    assignments : sequence of str
+        Parameters with which the maps are drawn.
+    bowed : bool
+        Whether the plan, where there is one, is bowed as the walls of the map are.
+    """
+    config = resolve_config(None, [*of.assignments, *assignments])
+    run = run.with_config(config)
     lidar, cleared = run.returns_map(), run.result().lidar_map
     grid, glass = read_map(of.truth), read_glass_cells(of.truth)
     truth = TrueMap(grid, np.zeros(grid.probability.shape, np.bool_) if glass is None else glass)
@@ -167,17 +188,24 @@ def mapped(of: Recorded, assignments: Sequence[str] = CARTOGRAPHER, *, bowed: bo
 
 
 def measure(
-    of: Recorded, names: Sequence[str], assignments: Sequence[str] = CARTOGRAPHER, *, bowed: bool = False
-) -> Measured:
-    """Map a recording once and compare every variant with the truth."""
-    one = mapped(of, assignments, bowed=bowed)
+    of: Recorded, names: Sequence[str], assignments: Sequence[str] = (), *, bowed: bool = False
+) -> dict[str, Measured]:
+    """Map a recording once and compare every variant with the truth, by each of the ways in `DRAWN`."""
+    run = finished(of, assignments)
+    return {
+        way: _compared(of.name, mapped(of, run, [*drawn, *assignments], bowed=bowed), names)
+        for way, drawn in DRAWN.items()
+    }
+
+
+def _compared(name: str, one: Mapped, names: Sequence[str]) -> Measured:
     rows = {LIDAR: one.row(one.lidar), CLEARED: one.row(one.cleared)}
-    for name in names:
-        if name in VARIANTS:
+    for variant in names:
+        if variant in VARIANTS:
             began = time.perf_counter()
-            grid = one.fused(VARIANTS[name], one.cleared if name == RSF_CLEARED else None)
-            rows[name] = one.row(grid, time.perf_counter() - began)
-    return Measured(of.name, one.truth.glass_share, rows)
+            grid = one.fused(VARIANTS[variant], one.cleared if variant == RSF_CLEARED else None)
+            rows[variant] = one.row(grid, time.perf_counter() - began)
+    return Measured(name, one.truth.glass_share, rows)
 
 
 def changed(base: SonarConfig, variant: dict[str, Any]) -> SonarConfig:

@@ -4,13 +4,12 @@ Every recording goes through SLAM once; all rows come from the same poses and th
 laid onto the map of the lidar once for all of them. Tables I and II are of the real hallway (scene 4), Table
 III of eight simulated scenes of the same kinds. Below them: the other decision layers, and two side sonars.
 
-As in pi-map the map of the lidar is drawn with the probabilities of Cartographer, and unknown cells have the
-grey 128; SSIM and NCC of the files that map_server saves, where it is 205, stand beside them.
+All of it comes twice: drawn as in pi-map, with the probabilities of Cartographer, and drawn as by default.
+Unknown cells have the grey 128; figures of the files that map_server saves, where it is 205, stand beside.
 
 python tools/fusion_table.py --data DATA                      everything; DATA holds pimap/scene4.bag
 python tools/fusion_table.py --scenes 1 4 --keep recordings   two simulated scenes; keep their recordings
 python tools/fusion_table.py --data DATA --scenes --json      the hallway alone; print the figures
-python tools/fusion_table.py --data DATA --own-map            maps drawn as glassslam draws them by default
 python tools/fusion_table.py --data DATA --scenes --bowed     the plan of the hallway bowed as the map is
 """
 
@@ -27,8 +26,8 @@ from typing import Any
 import numpy as np
 from fusion_rows import (
     ALGORITHMS,
-    CARTOGRAPHER,
     CLEARED,
+    DRAWN,
     HELD_OUT,
     LAYERS,
     LIDAR,
@@ -156,23 +155,22 @@ def parse_arguments(arguments: Sequence[str] | None = None) -> argparse.Namespac
     parser.add_argument(
         "--scenes", type=int, nargs="*", choices=SCENES, default=list(SCENES), help="simulated scenes [all]"
     )
-    parser.add_argument("--own-map", action="store_true", help="not the probabilities of Cartographer")
-    parser.add_argument("--bowed", action="store_true", help="lay the plan of the hallway on the map's walls")
+    parser.add_argument("--bowed", action="store_true", help="bow the plan of the hallway as the map is")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="use and keep simulated recordings here")
     parser.add_argument("--set", dest="assignments", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     return parser.parse_args(arguments)
 
 
-def measured(words: argparse.Namespace, folder: Path) -> tuple[Measured | None, list[Measured]]:
+def measured(words: argparse.Namespace, folder: Path) -> list[dict[str, Measured]]:
     """The hallway, if asked for, and the simulated scenes; their recordings are kept in the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    drawn = [*(() if words.own_map else CARTOGRAPHER), *words.assignments]
-    real = None
+    names, more = tuple(VARIANTS), words.assignments
+    out = []
     if words.data is not None:
         one = hallway(words.data, words.truth or true_hallway(folder))
-        real = measure(one, tuple(VARIANTS), drawn, bowed=words.bowed)
-    return real, [measure(simulated(k, folder), tuple(VARIANTS), drawn) for k in words.scenes]
+        out.append(measure(one, names, more, bowed=words.bowed))
+    return out + [measure(simulated(k, folder), names, more) for k in words.scenes]
 
 
 def true_hallway(folder: Path) -> Path:
@@ -188,11 +186,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = parse_arguments(arguments)
     try:
         with tempfile.TemporaryDirectory() as scratch:
-            real, scenes = measured(words, words.keep or Path(scratch))
+            found = measured(words, words.keep or Path(scratch))
         if words.json:
-            print(json.dumps([figures(one) for one in (*([real] if real else []), *scenes)], indent=2))
+            plain = [{"drawn": way, **figures(one)} for of in found for way, one in of.items()]
+            print(json.dumps(plain, indent=2))
         else:
-            show(Console(width=180), real, scenes)
+            console = Console(width=180)
+            for way in DRAWN:
+                console.rule(way)
+                scenes = [of[way] for of in found]
+                real = scenes.pop(0) if words.data is not None else None
+                show(console, real, scenes)
     except GlassSlamError as error:
         print(f"error: {error.message}" + (f" ({error.hint})" if error.hint else ""), file=sys.stderr)
         return error.exit_code

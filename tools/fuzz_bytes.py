@@ -147,6 +147,17 @@ def damaged_yaml(text: str, random: Random) -> bytes:
     return yaml.safe_dump(tree, sort_keys=False).encode()
 
 
+def odd_numbers(text: str, random: Random) -> bytes:
+    """A YAML text with one to three of its numbers changed."""
+    tree = yaml.safe_load(text)
+    numbers = [(owner, key) for owner, key in _leaves(tree) if type(owner[key]) in (int, float)]
+    for owner, key in random.choices(numbers, k=random.choice((1, 1, 2, 3))):
+        value = owner[key]
+        odd = (0, -value, 10 * value, value / 1000, value + 0.001, 1000, 1e6, 1e-9, -1e9, 1e30, 1e308)
+        owner[key] = random.choice((*odd, *(value + 0.3 * k for k in range(-6, 7))))
+    return yaml.safe_dump(tree, sort_keys=False).encode()
+
+
 def _leaves(tree: Any) -> Iterator[tuple[Any, Any]]:
     """Owner and key of everything in nested mappings and lists."""
     keys = list(tree) if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()

@@ -33,6 +33,7 @@ class Outcome:
 def run_case(words: Sequence[str], folder: Path) -> Outcome:
     """Run the command in a folder and look at what it says and leaves there."""
     before = {path.name for path in folder.iterdir()}
+    inputs = _inputs(folder)
     start = time.monotonic()
     code = _wait(_fork(words, folder), start)
     error = (folder / ".stderr").read_text(errors="replace")
@@ -40,10 +41,24 @@ def run_case(words: Sequence[str], folder: Path) -> Outcome:
     for name in (".stderr", ".stdout"):
         (folder / name).unlink()
     left = {path.name for path in folder.iterdir()} - before
+    if words[0] == "recover" and code in {0, 3}:
+        left -= {"done.partial"}  # what was saved, and a map of it
+    if "glassslam render out" in error or "glassslam map --resume out" in error:
+        left -= {"out.partial"}  # SLAM is done: the error tells what to do with its session
     violations = [*_said_wrong(code, error), *_left_wrong(code, left, folder)]
+    violations += [f"changed: {name}" for name, state in _inputs(folder).items() if inputs.get(name) != state]
     if "--json" in words and code in {0, 3}:
         violations += _printed_wrong(output)
     return Outcome(code, error, tuple(violations), time.monotonic() - start)
+
+
+def _inputs(folder: Path) -> dict[str, tuple[int, int]]:
+    """Length and time of change of every file that is not for results: none is ever written to."""
+    return {
+        str(path.relative_to(folder)): (path.stat().st_size, path.stat().st_mtime_ns)
+        for path in folder.rglob("*")
+        if path.is_file() and not path.relative_to(folder).parts[0].startswith(("out", ".", "done"))
+    }
 
 
 def _fork(words: Sequence[str], folder: Path) -> int:
@@ -113,12 +128,11 @@ def _said_wrong(code: int, error: str) -> list[str]:
 
 
 def _left_wrong(code: int, left: set[str], folder: Path) -> list[str]:
-    wrong = [f"left behind: {name}" for name in sorted(left - {"out"})]
-    out = folder / "out"
-    if "out" not in left:
-        return wrong
-    if code not in {0, 3}:
+    results = {name for name in left if name == "out" or name.startswith("out.bag")}
+    wrong = [f"left behind: {name}" for name in sorted(left - results)]
+    if results and code not in {0, 3}:
         return [*wrong, "results in spite of a failure"]
+    out = folder / "out"
     if (out / "map.yaml").exists():
         wrong += [f"{name} is missing" for name in RESULT_FILES if not (out / name).exists()]
         text = (out / "trajectory.tum").read_text()

@@ -8,6 +8,7 @@ from random import Random
 from typing import TypeAlias
 
 from fuzz_bytes import damaged_bytes, damaged_log, damaged_words, damaged_yaml
+from fuzz_commands import make_scene, make_session, make_unmerged, make_volume
 from fuzz_messages import damaged, write_take
 from fuzz_seeds import Seeds, calibration_file, parameter_files
 
@@ -182,5 +183,9 @@ KINDS: dict[str, Callable[[Random, Seeds, Path], Words]] = {
     "config": _config,
     "calibration": _calibration,
     "truth": _truth,
+    "unmerged": make_unmerged,
+    "scene": make_scene,
+    "volume": make_volume,
+    "session": make_session,
 }
 """How every kind of input is made."""

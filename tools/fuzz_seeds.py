@@ -9,6 +9,7 @@ from pathlib import Path
 
 import yaml
 from fuzz_messages import Take, take_of, write_take
+from fuzz_states import Files, as_ros2, points, scene_text, sessions, unmerged
 
 from glassslam.cli import main
 from glassslam.simulation import Scene, simulate, write_recording
@@ -56,6 +57,12 @@ class Seeds:
     run, log, sonar, fine : Path
         A results directory with truths beside it, a CARMEN log, a pi-map sonar log, a bag of the lidar that
         was calibrated: used undamaged.
+    scene : str
+        YAML of a scene to simulate.
+    points : dict
+        A recording with points of a 3D sensor, and a trajectory.
+    unmerged, sessions : dict
+        Name -> files of databases with their logs, and of runs that are finished or were killed.
     """
 
     takes: tuple[Take, ...]
@@ -66,13 +73,18 @@ class Seeds:
     log: Path
     sonar: Path
     fine: Path
+    scene: str
+    points: Files
+    unmerged: dict[str, Files]
+    sessions: dict[str, Files]
 
 
 def make_seeds(folder: Path, data: Path | None) -> Seeds:
     """Simulate, cut and map what is needed; `data` holds real recordings."""
     simulated = _simulated(folder, "rplidar", "turtlebot-9")
     fine = write_take(take_of(_simulated(folder, CALIBRATED, None), 8), folder / "sound", "none")
-    takes = [take_of(simulated, _SCANS), *_real_takes(data)]
+    made = take_of(simulated, _SCANS)
+    takes = [made, as_ros2(made), *_real_takes(data)]
     logs = {"carmen": _carmen(data), "player": {"run.log": _player()}, "pimap": _pimap(data)}
     bags, folders = {}, {}
     for number, take in enumerate(takes):
@@ -85,7 +97,10 @@ def make_seeds(folder: Path, data: Path | None) -> Seeds:
     log, sonar = folder / "sound.log", folder / "sonar.txt"
     log.write_bytes(logs["carmen"]["simple.log"])
     sonar.write_bytes(logs["pimap"]["sonar.txt"])
-    return Seeds(tuple(takes), bags, folders, logs, _run(folder, simulated), log, sonar, fine)
+    return Seeds(
+        tuple(takes), bags, folders, logs, _run(folder, simulated), log, sonar, fine,
+        scene_text(), points(folder), unmerged(takes[1], folder), sessions(log, folder),
+    )  # fmt: skip
 
 
 def _simulated(folder: Path, sensor: str, sonar: str | None) -> Path:

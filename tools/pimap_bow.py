@@ -51,7 +51,8 @@ def bow_of(plan: "Plan", lidar_map: OccupancyMap, map_from_plan: tuple[float, fl
     at_knots: FloatArray = np.zeros(len(knots))
     for _ in range(_ROUNDS):
         left = np.vstack((hats * weight[:, None], bends))
-        at_knots = np.linalg.lstsq(left, np.append(offset * weight, np.zeros(len(bends))), rcond=None)[0]
+        right = np.append(offset * weight, np.zeros(len(bends)))
+        at_knots = np.asarray(np.linalg.lstsq(left, right, rcond=None)[0], dtype=np.float64)
         # things that stand before a wall must not bend it
         weight = 1.0 / np.hypot(1.0, (offset - hats @ at_knots) / _SCATTER)
     return knots, at_knots

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glassslam.cli.run import named_target, session_path
+from glassslam.cli.workplace import named_target, session_path
 from glassslam.errors import OutputError, SessionError
 
 if TYPE_CHECKING:

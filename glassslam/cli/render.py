@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glassslam.cli.run import (
-    Manner,
-    conclude,
-    explained_end,
-    go_on_with,
-    made_directory,
-    make_room,
-    named_target,
-    session_path,
-)
+from glassslam.cli.run import Manner, conclude, explained_end, go_on_with
+from glassslam.cli.workplace import check_room, made_directory, named_target, session_path
 from glassslam.errors import GlassSlamError, InterruptedRunError, OutputError, UsageError
 
 if TYPE_CHECKING:
@@ -107,7 +99,7 @@ def _render(
         check_directory(target, overwrite=overwrite)
         folder = working_directory(target)
         if source.parent != folder:
-            make_room(folder, target, overwrite=False)
+            check_room(folder, target, overwrite=False)
             with made_directory(folder):
                 Session.copy(source, folder / SESSION_FILE)
         with explained_end(target), Session.open(folder / SESSION_FILE) as session:

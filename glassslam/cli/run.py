@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from glassslam.cli.interruption import Bell, Terminated, stopping
+from glassslam.cli.workplace import check_room, clear_but_session, made_directory, named_target, session_path
 from glassslam.errors import (
     GlassSlamError,
     GridError,
@@ -15,7 +16,6 @@ from glassslam.errors import (
     NoScansError,
     OutputError,
     SessionError,
-    UsageError,
 )
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from glassslam.outputs import Stopwatch
     from glassslam.session import Session
     from glassslam.sources import Recording, SourceOptions
-
-SUFFIX = ".partial"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ def begin(
     with locked(target):
         restore_results(target)
         folder = working_directory(target)
-        make_room(folder, target, overwrite=overwrite)
+        check_room(folder, target, overwrite=overwrite)
         source = open_recording(recordings, options)
         with made_directory(folder):
             session = Session.create(folder / SESSION_FILE, recordings, config, options)
@@ -167,74 +165,6 @@ def is_damaged(report: dict[str, Any]) -> bool:
     return bool(report["damage"] or report["solver_failures"]) or any(
         (*report["scans"]["dropped"].values(), *report["messages_dropped"].values())
     )
-
-
-def named_target(directory: Path) -> Path:
-    """The results directory meant by its own name or by that of its working directory."""
-    return directory.with_name(directory.name.removesuffix(SUFFIX)) if directory.name != SUFFIX else directory
-
-
-def session_path(target: Path) -> Path:
-    """The session of a results directory: that of a run in progress, or else that of the results.
-
-    Raises
-    ------
-    UsageError
-        There is none.
-    """
-    from glassslam.outputs.directory import working_directory  # noqa: PLC0415
-    from glassslam.session import SESSION_FILE  # noqa: PLC0415
-
-    for folder in (working_directory(target), target.resolve()):
-        if (folder / SESSION_FILE).is_file():
-            return folder / SESSION_FILE
-    raise UsageError(
-        f"there is no session for {target}", "name the results directory of a run: -o DIR of glassslam map"
-    )
-
-
-def clear_but_session(folder: Path) -> None:
-    """Remove what a partial map or a killed run has left beside the session."""
-    from glassslam.session import SESSION_FILE  # noqa: PLC0415
-
-    kept = {f"{SESSION_FILE}{ending}" for ending in ("", "-wal", "-shm", "-journal")}
-    for path in folder.iterdir():
-        if path.name not in kept:
-            path.unlink()
-
-
-def make_room(folder: Path, target: Path, *, overwrite: bool) -> None:
-    """Make sure that no earlier run waits to be finished."""
-    from glassslam.session import SESSION_FILE, is_session  # noqa: PLC0415
-
-    if not folder.exists():
-        return
-    if not overwrite and is_session(folder / SESSION_FILE):
-        raise UsageError(
-            f"a run into {target} was interrupted and waits in {folder.name}",
-            f"go on: glassslam map --resume {target}; or begin anew: --overwrite",
-        )
-    foreign = [path.name for path in folder.iterdir() if not path.is_file()]
-    if foreign:
-        raise OutputError(f"{folder} holds what is no result: {foreign[0]}", "choose another directory")
-    shutil.rmtree(folder)
-
-
-@contextmanager
-def made_directory(folder: Path) -> Iterator[None]:
-    """Make a working directory, which stays where the block succeeds."""
-    made = [parent for parent in folder.parents if not parent.exists()]
-    try:
-        folder.mkdir(parents=True)
-        yield
-    except BaseException as error:
-        shutil.rmtree(folder, ignore_errors=True)
-        for parent in made:
-            if parent.is_dir() and not any(parent.iterdir()):
-                parent.rmdir()
-        if isinstance(error, OSError):
-            raise OutputError(f"cannot write {folder}: {error.strerror}") from error
-        raise
 
 
 @contextmanager

@@ -10,6 +10,8 @@ from glassslam.cli.progress import speed
 from glassslam.cli.terminal import emit_rich
 from glassslam.records import Damage
 
+_TOLD_METRES = 0.1
+
 
 def show_summary(report: dict[str, Any], written: Sequence[Path]) -> None:
     """Print what a run has found and cost, and the files it has written.
@@ -42,6 +44,7 @@ def summary_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
         ("graph", f"{report['nodes']} nodes, {report['submaps']} submaps"),
         ("loop closures", f"{closures['accepted']} of {closures['tried']} tried{_rejected(closures)}"),
     ]
+    rows += _uncertain(report["degeneracies"])
     rows.append(("glass", _glass(report["glass"])))
     rows += _volume(report["volume"])
     rows += [("residual", f"{name} {value:.4g}") for name, value in _numbers(report["residuals"])]
@@ -54,6 +57,18 @@ def summary_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
         rows.append(("total", f"{wall:.2f} s ({cpu:.2f} s CPU), {speed(report['recording_seconds'], wall)}"))
         rows.append(("peak memory", f"{resources['peak_memory_mb']:.0f} MB"))
     return rows + [("warning", text) for text in report["warnings"]]
+
+
+def _uncertain(stretches: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Stretches the scans did not decide, counted by kind in the order in which they first come."""
+    if not stretches:
+        return []
+    parts = []
+    for kind in dict.fromkeys(one["kind"] for one in stretches):
+        lengths = [one["length_m"] for one in stretches if one["kind"] == kind]
+        metres = sum(length or 0.0 for length in lengths)
+        parts.append(f"{len(lengths)} x {kind}" + (f" ({metres:.1f} m)" if metres >= _TOLD_METRES else ""))
+    return [("uncertain", f"{', '.join(parts)}; see report")]
 
 
 def _glass(glass: dict[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """Writing to the terminal: results to standard output, complaints as one line to standard error."""
 
 import os
+import re
 import sys
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 _LONGEST = 1000  # characters: messages quote what they have found
+# Names from a recording may hold what moves the cursor or renames the window; colours are harmless.
+_CONTROL = re.compile(r"\x1b(?!\[[0-9;]*m)|[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f]")
 
 
 def emit(text: str) -> None:
@@ -70,5 +73,6 @@ def discard_output() -> None:
 
 
 def _writable(text: str, encoding: str | None) -> str:
-    """Replace what the stream cannot encode: file names may hold any byte."""
+    """Replace what the stream cannot encode, or what commands a terminal: names may hold any byte."""
+    text = _CONTROL.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
     return text.encode(encoding or "utf-8", "backslashreplace").decode(encoding or "utf-8")

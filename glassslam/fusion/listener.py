@@ -1,5 +1,6 @@
 """What sonars add to a run: pieces of glass before the walls are fitted, maps afterwards."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,10 +11,11 @@ from glassslam.config import SonarConfig
 from glassslam.fusion.fuse import FusedMap, fuse
 from glassslam.fusion.layer_kernels import clear_rays
 from glassslam.fusion.revisit import FREE, side_sonars
+from glassslam.fusion.revisit_kernels import revisit
 from glassslam.glass.beams import BeamEvidence
 from glassslam.glass.layer import wall_cells
 from glassslam.glass.observations import GlassObservations
-from glassslam.records import RangeRing, SonarRing
+from glassslam.records import Float32Array, RangeRing, SonarRing
 from glassslam.slam.result import MapResult, OccupancyMap, SonarMaps
 from glassslam.slam.trajectory import PoseTracks
 from glassslam.sonar.glass import sonar_glass_observations
@@ -23,6 +25,7 @@ from glassslam.sonar.sweeps import SonarSweeps, placed_sweeps
 
 _OCCUPIED = 0.65
 _LIDAR, _SONAR, _BOTH = 1, 2, 3
+_ROUNDING = 1e-3
 
 
 class SonarListener:
@@ -102,8 +105,9 @@ def by_walls(result: MapResult, sweeps: SonarSweeps, config: SonarConfig) -> Fus
 
     Every sensor gives oriented pieces of surface with its own uncertainty; walls are fitted to all of them
     together, and the beams of the lidar decide how far they reach. The map is that of the lidar, with its
-    beams ending at the walls; where no beam came, it is free up to where a sonar heard something, but not
-    behind what is occupied.
+    beams ending at the walls. What it has seen and not decided is free on the axes of sonars up to what is
+    occupied; where no beam came, it is free up to where a sonar heard something. One return with nothing
+    beside it is no obstacle, but noise or a mirror image.
 
     Parameters
     ----------
@@ -114,14 +118,40 @@ def by_walls(result: MapResult, sweeps: SonarSweeps, config: SonarConfig) -> Fus
     config : SonarConfig
         Longest reading used.
     """
-    closed = result.closed_map or result.map
+    closed = _without_lone_returns(result.closed_map or result.map, result.config.map.hit_probability)
     unknown = np.isnan(closed.probability)
     added = unknown & _cleared(closed, sweeps, config)
-    probability = np.where(added, np.float32(FREE), closed.probability)
+    probability = np.where(added, np.float32(FREE), _in_sight(closed, sweeps))
     source = np.where(unknown, 0, _LIDAR).astype(np.uint8)
     source[added] = _SONAR
     _mark_walls(source, result, (source.shape[0], source.shape[1]), closed)
     return FusedMap(OccupancyMap(probability, closed.resolution, closed.origin), source)
+
+
+def _without_lone_returns(grid: OccupancyMap, hit_probability: float) -> OccupancyMap:
+    """The map without occupied cells that no other touches and that rest on a single return."""
+    occupied = grid.probability > _OCCUPIED
+    count = np.pad(occupied.astype(np.uint8), 1)
+    rows = count[:-2] + count[1:-1] + count[2:]
+    around = rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]
+    lone = occupied & (around == 1) & (grid.probability < hit_probability + _ROUNDING)
+    return replace(grid, probability=np.where(lone, np.float32(np.nan), grid.probability))
+
+
+def _in_sight(grid: OccupancyMap, sweeps: SonarSweeps) -> Float32Array:
+    """P(occupied) with the cells made free that the lidar has seen, and that the axes of sonars reach.
+
+    Axes end at what is occupied, however far away; those that nothing stops tell nothing. Where the odds of
+    the map need many beams, much of a room is seen and not decided.
+    """
+    occupied = grid.probability > _OCCUPIED
+    rays = sweeps.sensors.reshape(-1, 3).copy()
+    rays[:, :2] = (rays[:, :2] - np.asarray(grid.origin)) / grid.resolution
+    path = np.empty((sum(occupied.shape), 2), dtype=np.int64)
+    paved, source = grid.probability.copy(), np.zeros(occupied.shape, dtype=np.uint8)
+    revisit(rays, occupied, occupied, math.inf, True, FREE, _OCCUPIED, path, paved, source)
+    open_to_view = (source > 0) & ~occupied & ~np.isnan(grid.probability)
+    return np.where(open_to_view, np.minimum(grid.probability, np.float32(FREE)), grid.probability)
 
 
 def _cleared(grid: OccupancyMap, sweeps: SonarSweeps, config: SonarConfig) -> NDArray[np.bool_]:

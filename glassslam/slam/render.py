@@ -130,7 +130,9 @@ def _closed(run: "SettledRun", glass: GlassLayer) -> OccupancyMap:
     rays = list(visible_rays(nodes, glass.ghosts, "none"))
     silent = [len(node.free_ends) for node in nodes]
     parts = [(free[:count], free[count:]) for count, (_, free) in zip(silent, rays, strict=True)]
-    bare = _drawn(nodes, poses, config, [(hit, cut) for (hit, _), (_, cut) in zip(rays, parts, strict=True)])
+    # what is opaque, and what silence means, does not depend on the odds the map is written with
+    usual = MapConfig(resolution=config.resolution)
+    bare = _drawn(nodes, poses, usual, [(hit, cut) for (hit, _), (_, cut) in zip(rays, parts, strict=True)])
     opaque = (bare.probability > _OCCUPIED) & ~_near(_wall_mask(bare, glass))
     heard = [(hit, quiet) for (hit, _), (quiet, _) in zip(rays, parts, strict=True)]
     if occupied_where_silent(nodes, poses, heard, bare, opaque) < _FREE:

@@ -116,6 +116,22 @@ def test_each_metric_of_a_drawing_counted_by_hand(draw_map):
     assert 0.5 < errors.ssim < 1.0
 
 
+def test_unknown_cells_have_the_grey_that_is_asked_for(draw_map):
+    drawing = draw_map("########\n#......#\n#......#\n#...??.#\n#...??.#\n#......#\n########")
+    whole = draw_map("########\n#......#\n#......#\n#......#\n#......#\n#......#\n########")
+    own = (0.0, 0.0, 0.0)
+    for grey in (205, 128, 0, 255):
+        errors = evaluate_image(drawing, whole, map_from_truth=own, unknown_grey=grey)
+        assert errors.mse * errors.rows * errors.columns == pytest.approx(4 * (254 - grey) ** 2)
+    assert evaluate_image(drawing, whole, map_from_truth=own) == evaluate_image(
+        drawing, whole, map_from_truth=own, unknown_grey=205
+    )
+    for grey in (-1, 256):
+        with pytest.raises(EvaluationError, match=rf"^no grey value is {grey}$") as caught:
+            evaluate_image(drawing, whole, map_from_truth=own, unknown_grey=grey)
+        assert caught.value.hint == "unknown_grey lies between 0 and 255"
+
+
 def test_correlation_by_hand():
     a = np.array([[0, 0], [254, 254]], dtype=np.uint8)
     b = np.array([[0, 254], [254, 254]], dtype=np.uint8)

@@ -2,15 +2,19 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from glassslam.evaluation import read_glass_cells, read_map
+from glassslam.evaluation import evaluate_image, read_glass_cells, read_map
+from glassslam.outputs import write_map
 from glassslam.yamlmodel import load_yaml_model
 
 ROOT = Path(__file__).resolve().parents[2]
+# the programs import their neighbours
+sys.path.append(str(ROOT / "tools"))
 
 
 def load(name):
@@ -22,6 +26,7 @@ def load(name):
     return module
 
 
+bow = load("pimap_bow")
 tool = load("pimap_truth")
 
 
@@ -107,3 +112,55 @@ def test_the_lines_lie_where_the_recording_shows_walls(plan, data_dir):
             near = tool.across(points, line)
             assert near.size == pytest.approx(line.points, rel=0.3)
             assert abs(near.mean()) < 0.006
+
+
+BOW = (np.array([-2.0, 13.0, 29.0]), np.array([-0.05, 0.08, -0.03]))
+
+
+@pytest.fixture(scope="module")
+def bowed_map(plan):
+    return tool.draw(plan, bow=BOW)
+
+
+class TestBow:
+    """A map that is bowed, as a trajectory is, tells it by its opaque walls."""
+
+    def test_lines_follow_it_without_gaps(self):
+        pieces, of_line = bow.bowed(np.array([[0.0, 1.0, 10.0, 1.0], [5.0, 0.0, 5.0, 0.2]]), BOW)
+        assert of_line.tolist() == [0] * 20 + [1]
+        assert np.array_equal(pieces[1:20, :2], pieces[:19, 2:])
+        expected = np.interp(pieces[:20, 0::2], *BOW) + 1.0
+        assert pieces[:20, 1::2] == pytest.approx(expected)
+
+    def test_it_is_found_to_a_cell_by_a_map_without_glass(self, plan, bowed_map):
+        opaque = np.where(bowed_map.glass, np.nan, bowed_map.grid.probability)
+        knots, offsets = bow.bow_of(plan, replace(bowed_map.grid, probability=opaque), (0.0, 0.0, 0.0))
+        places = np.linspace(0.0, 28.0, 57)
+        error = np.interp(places, knots, offsets) - np.interp(places, *BOW)
+        assert np.abs(error).max() < 0.04
+        assert np.abs(error).mean() < 0.02
+
+    def test_walls_from_either_end_and_things_off_the_wall_do_not_mislead_it(self, plan):
+        wall = next(line for line in plan.segments if line.name == "south-4")
+        turned = wall.model_copy(update={"start": wall.end, "end": wall.start})
+        points = np.array([[11.0, -0.74], [12.0, -0.74], [12.0, 0.5], [20.0, -0.74]])
+        for line in (wall, turned):
+            x, offset = bow.wall_offsets(plan.model_copy(update={"segments": (line,)}), points)
+            assert x.tolist() == [11.0, 12.0]
+            assert offset == pytest.approx([0.045, 0.045], abs=0.03)
+
+    def test_the_truth_is_laid_onto_a_map_by_the_program(self, plan, bowed_map, tmp_path, capsys):
+        write_map(bowed_map.grid, tmp_path / "map.yaml")
+        assert tool.main(["-o", str(tmp_path), "--onto", str(tmp_path / "map.yaml")]) == 0
+        laid, straight = read_map(tmp_path / "pimap_scene4.yaml"), tool.draw(plan).grid
+
+        def likeness(truth):
+            return evaluate_image(bowed_map.grid, truth).ncc
+
+        assert likeness(laid) > likeness(straight) + 0.1
+        assert "30.5" in capsys.readouterr().out
+
+    def test_it_excludes_the_bend_of_the_published_poses(self, tmp_path, capsys):
+        with pytest.raises(SystemExit):
+            tool.main(["-o", str(tmp_path), "--as-measured", "--onto", "map.yaml"])
+        assert "--as-measured and --onto exclude each other" in capsys.readouterr().err

@@ -176,6 +176,19 @@ class TestByWalls:
         heard = sweeps([(0.25, 0.25, 0.0)], ring(LEFT), [[1.8]])
         assert by_walls(run, heard, SonarConfig()).source[:, 0].tolist() == [1, 1, 0, 0]
 
+    @pytest.mark.parametrize(("returns", "is_obstacle"), [(0.8, False), (0.94, True)])
+    def test_one_return_with_nothing_beside_it_is_no_obstacle(
+        self, tiny_result, draw_map, returns, is_obstacle
+    ):
+        lidar = draw_map("#??.\n????\n?##?\n....")
+        lidar.probability[lidar.probability > 0.65] = returns
+        run = replace(tiny_result, map=lidar, lidar_map=lidar, closed_map=lidar)
+        fused = by_walls(run, sweeps([], ring(LEFT)), SonarConfig())
+        occupied = fused.map.probability > 0.65
+        assert occupied[3, 0] == is_obstacle
+        assert fused.source[3, 0] == is_obstacle
+        assert occupied[1].tolist() == [False, True, True, False], "two of them are a thing"
+
     @pytest.mark.parametrize(("observations", "by_sonar", "who"), [(9, 0, 1), (9, 9, 2), (9, 4, 3)])
     def test_walls_tell_which_sensors_saw_them(self, tiny_result, draw_map, observations, by_sonar, who):
         fused = self.fused(tiny_result, draw_map, (self.wall(observations, by_sonar),))
