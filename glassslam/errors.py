@@ -74,5 +74,9 @@ class GridError(GlassSlamError):
     """A probability grid, or a scan entered into one or matched against it, that makes no sense."""
 
 
+class MapSizeError(GridError):
+    """A map that would be larger than any building."""
+
+
 class GraphError(GlassSlamError):
     """A pose graph that cannot be built or solved."""

@@ -11,8 +11,8 @@ from glassslam.cli.interruption import Bell, Terminated, stopping
 from glassslam.cli.workplace import check_room, clear_but_session, made_directory, named_target, session_path
 from glassslam.errors import (
     GlassSlamError,
-    GridError,
     InterruptedRunError,
+    MapSizeError,
     NoScansError,
     OutputError,
     SessionError,
@@ -76,16 +76,16 @@ def begin(
         with explained_end(target), session:
             try:
                 finished = _slam(source, session, target, manner)
+                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
             except (OutputError, InterruptedRunError):
                 raise
-            except GlassSlamError:  # it would fail again
-                shutil.rmtree(folder)
+            except GlassSlamError as error:
+                if isinstance(error, MapSizeError) and session.is_finished:
+                    hint = f"{error.hint}; poses are kept: glassslam render {target} --set ..."
+                    raise MapSizeError(error.message, hint) from error
+                session.abandon()
+                shutil.rmtree(folder)  # it would fail again
                 raise
-            try:
-                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
-            except GridError as error:
-                hint = f"{error.hint}; poses are kept: glassslam render {target} --set ..."
-                raise GridError(error.message, hint) from error
 
 
 def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -> int:

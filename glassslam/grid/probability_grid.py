@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.errors import GridError
+from glassslam.errors import GridError, MapSizeError
 from glassslam.grid.kernels import Cells, extend_box, insert_scan
 from glassslam.grid.odds import OddsModel
 from glassslam.records import Float32Array, FloatArray
@@ -46,12 +46,12 @@ def check_size(columns: float, rows: float, resolution: float) -> None:
 
     Raises
     ------
-    GridError
+    MapSizeError
         It would have more cells than that; the message tells metres and gigabytes.
     """
     if columns * rows > MOST_CELLS:
         gigabytes = columns * rows * _BYTES_PER_CELL / 1e9
-        raise GridError(
+        raise MapSizeError(
             f"a map of {columns * resolution:.0f} x {rows * resolution:.0f} m in cells of "
             f"{resolution:g} m would take {gigabytes:.1f} GB",
             _TOO_FAR,

@@ -69,7 +69,7 @@ def read_arrays(
             known = content.files if isinstance(content, np.lib.npyio.NpzFile) else None
             size = sum(member.file_size for member in content.zip.infolist()) if known else 0
             if size > MOST_BYTES:
-                raise kind(f"{path} would unpack to {size / 1e9:.1f} GB", hint)
+                raise kind(f"{path} would unpack to {size / 1e9:.1f} GB", hint)  # noqa: TRY301  (its like is passed on below)
             arrays = {name: content[name] for name in (*names, *optional) if known and name in known}
     except GlassSlamError:
         raise

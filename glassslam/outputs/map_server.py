@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from glassslam.errors import OutputError
+from glassslam.errors import GridError, OutputError
 from glassslam.outputs.image_file import read_image
 from glassslam.outputs.table import read_text
 from glassslam.records import Float32Array
@@ -56,14 +56,14 @@ def write_map(grid: OccupancyMap, path: str | Path) -> list[Path]:
 
     Raises
     ------
-    OutputError
+    GridError
         The map has no cells.
     OSError
         A file cannot be written.
     """
     description, image = Path(path), Path(path).with_suffix(".pgm")
     if grid.probability.size == 0:
-        raise OutputError("the map has no cells", "was there any scan with a range in it?")
+        raise GridError("the map has no cells", "was there any scan with a range in it?")
     pixels = trinary_image(grid)
     image.write_bytes(b"P5\n%d %d\n255\n" % pixels.shape[::-1] + pixels.tobytes())
     # Written by hand: YAML 1.1 writers turn 5e-05 into a string that nav2 cannot read back as a number.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glassslam.errors import OutputError
+from glassslam.errors import GridError, OutputError
 from glassslam.glass.layer import GlassLayer
 from glassslam.records import Float32Array, FloatArray, Trajectory
 from glassslam.slam.result import OccupancyMap
@@ -69,15 +69,17 @@ def write_picture(
 
     Raises
     ------
+    GridError
+        The map has no cells.
     OutputError
-        The map has no cells or is too large for a PNG.
+        It is too large for a PNG.
     OSError
         The file cannot be written.
     """
     import cv2  # noqa: PLC0415  (only pictures need it)
 
     if grid.probability.size == 0:
-        raise OutputError("the map has no cells", "was there any scan with a range in it?")
+        raise GridError("the map has no cells", "was there any scan with a range in it?")
     zoom = min(_LARGEST_ZOOM, max(1, math.ceil(_READABLE / max(grid.probability.shape))))
     canvas = _blank(cv2, grid, zoom)
     if glass is not None:

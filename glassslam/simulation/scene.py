@@ -1,5 +1,6 @@
 """A simulated world as written down: floor plan, materials, robot path and odometry."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -10,7 +11,13 @@ from glassslam.errors import ConfigError
 from glassslam.simulation.materials import MATERIALS, Finite, Material, NonNegative, Part, Positive
 from glassslam.yamlmodel import load_yaml_model
 
-Point = tuple[Finite, Finite]
+Coordinate = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
+Extent = Annotated[float, Field(ge=1e-3, le=1e3, allow_inf_nan=False)]
+Point = tuple[Coordinate, Coordinate]
+
+# The true map of a larger plan would not fit into memory: 700 m x 700 m.
+LARGEST_PLAN = 490_000.0
+LONGEST_DRIVE = 4 * 3600.0
 
 
 class Opening(Part):
@@ -25,7 +32,7 @@ class Opening(Part):
 class Panes(Part):
     """How a line of glass is divided: panes of equal width between mullions."""
 
-    width: Positive = 1.2
+    width: Annotated[Extent, Field(ge=0.05)] = 1.2
     """Widest pane, mullion included, m."""
     mullion: Positive = 0.06
     """Width of a mullion along the line, m."""
@@ -76,7 +83,7 @@ class Box(Solid):
 
     name: str
     material: str
-    size: tuple[Positive, Positive]
+    size: tuple[Extent, Extent]
     """Extent along the x and y axis of the box, m."""
     at: Annotated[tuple[Point, ...], Field(min_length=1)]
     """Centre of each."""
@@ -88,7 +95,7 @@ class Post(Solid):
 
     name: str
     material: str
-    radius: Positive
+    radius: Extent
     at: Annotated[tuple[Point, ...], Field(min_length=1)]
     """Centre of each."""
 
@@ -133,6 +140,17 @@ class Drive(Part):
     """Distance of the carrot the robot steers for, m."""
     radius: Positive = 0.22
     """The robot must not come nearer to anything than this, m."""
+
+    @model_validator(mode="after")
+    def _ends(self) -> Self:
+        steps = zip(self.waypoints, self.waypoints[1:], strict=False)
+        seconds = sum(math.dist(a.at, b.at) / b.speed for a, b in steps)
+        seconds += sum(waypoint.stop or 0.0 for waypoint in self.waypoints)
+        if seconds > LONGEST_DRIVE:
+            raise ValueError(
+                f"the drive takes {seconds / 3600:.1f} h, at most are {LONGEST_DRIVE / 3600:g} h"
+            )
+        return self
 
 
 class OdometryModel(Part):
@@ -187,7 +205,7 @@ class Scene(Part):
     """A 3D ultrasonic sensor carried as well."""
     scan_rate: Positive | None = None
     """Scans recorded per second, at most those of the lidar; all when omitted."""
-    start_time: NonNegative = 1_500_000_000.0
+    start_time: Annotated[float, Field(ge=0, le=4e9, allow_inf_nan=False)] = 1_500_000_000.0
     """Stamp of the first moment, s since 1970."""
     materials: dict[str, Material] = Field(default_factory=dict)
     walls: tuple[Wall, ...] = ()
@@ -208,6 +226,17 @@ class Scene(Part):
             if material not in self.palette():
                 known = ", ".join(self.palette())
                 raise ValueError(f"{name!r} is made of unknown {material!r} (known: {known})")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_into_memory(self) -> Self:
+        places = [point for wall in self.walls for point in wall.points]
+        things: list[Box | Post] = [*self.boxes, *self.posts]
+        places += [point for thing in things for point in thing.at]
+        places += [waypoint.at for waypoint in self.drive.waypoints]
+        width, depth = (max(p[axis] for p in places) - min(p[axis] for p in places) for axis in (0, 1))
+        if width * depth > LARGEST_PLAN:
+            raise ValueError(f"the plan covers {width:.0f} x {depth:.0f} m, at most {LARGEST_PLAN:.0f} m2")
         return self
 
     def palette(self) -> dict[str, Material]:

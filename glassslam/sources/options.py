@@ -42,7 +42,7 @@ class SourceOptions:
     sonar_ring : str, Path or None
         Where the sonars sit: the name of a shipped ring or a YAML file; None: as recorded.
     strict : bool
-        Refuse a damaged bag; otherwise what is readable of it is read, and `Recording.damage` tells the rest.
+        Refuse a damaged file; otherwise what is readable is read, and `Recording.damage` tells the rest.
 
     Raises
     ------

@@ -182,6 +182,9 @@ def test_a_featureless_corridor_is_about_as_long_as_the_wheels_say():
     result = run(recording(CORRIDOR, path, odometry(path), beams=180))
     assert is_whole(result)
     assert length(result) == pytest.approx(9.9, abs=1.2)  # bare walls say nothing of the way along them
+    told = [one for one in result.statistics.degeneracies if one.kind == "featureless"]
+    assert sum(one.length for one in told) > 7.0
+    assert any("could slide along a featureless corridor" in text for text in result.statistics.warnings)
 
 
 def test_a_lifted_robot_keeps_its_place():

@@ -12,8 +12,9 @@ import yaml
 from glassslam.cli import main
 from glassslam.cli.terminal import complain
 from glassslam.config import Config
-from glassslam.errors import ConfigError, OutputError
+from glassslam.errors import ConfigError, OutputError, SessionError
 from glassslam.outputs.image_file import read_image
+from glassslam.session.database import explained
 from glassslam.yamltext import parse_yaml
 
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -51,6 +52,7 @@ def test_sound_yaml_is_that_of_the_library(text):
     [
         ("sensor: {max_range: .nan}", "sensor.max_range"),
         ("sensor: {max_range: .inf}", "sensor.max_range"),
+        ("local: {occupied_space_weight: 1.0e-320}", "local.occupied_space_weight"),
         ("sensor: {max_rang: 20}", "unknown parameter 'sensor.max_rang'"),
         ("[" * 5000, "nests too deeply"),
         (BOMB, "a million"),
@@ -177,3 +179,14 @@ def test_a_pose_out_of_all_proportion(tmp_path, capsys):
     (tmp_path / "a.tum").write_text("0 0 0 0 0 0 0 1\n1 1e200 0 0 0 0 0 1\n")
     assert main(["evaluate", str(tmp_path / "a.tum"), "--trajectory", str(tmp_path / "a.tum")]) == 1
     assert "line 2: '1e200' is out of all proportion" in capsys.readouterr().err
+
+
+def test_a_session_that_names_its_tables_in_no_text(tmp_path):
+    """SQLite quotes names it has found in the file, and Python cannot read its words then."""
+    path = tmp_path / "run.partial" / "session.db"
+    with (
+        pytest.raises(SessionError, match=r"session\.db is damaged: a text in it is none") as caught,
+        explained(path),
+    ):
+        b"malformed database schema (\xff)".decode()
+    assert caught.value.hint == "save what there is: glassslam recover run"

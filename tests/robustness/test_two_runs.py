@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from glassslam.cli import main
+from glassslam.cli.demo import demo as run_demo
 from glassslam.errors import OutputError
 from glassslam.outputs import directory, staged_directory
 from glassslam.outputs.lock import locked
@@ -69,9 +70,7 @@ def test_a_lock_left_by_a_killed_demo_is_no_foreign_file(tmp_path, monkeypatch):
     assert main(demo) == 1
     (tmp_path / "letter").unlink()
     with pytest.raises(TypeError, match="not callable"):
-        from glassslam.cli.demo import demo as run
-
-        run(tmp_path)
+        run_demo(tmp_path)
 
 
 def test_other_directories_are_free(tmp_path, other_run):
