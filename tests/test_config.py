@@ -35,7 +35,10 @@ def nested(path, value):
 def attributes():
     """Names read from any object, anywhere in the library but the configuration itself."""
     root = Path(glassslam.__file__).parent
-    trees = [ast.parse(path.read_text()) for path in root.rglob("*.py") if path.name != "config.py"]
+    files = [
+        path for path in root.rglob("*.py") if "parameters" not in path.parts and path.name != "config.py"
+    ]
+    trees = [ast.parse(path.read_text()) for path in files]
     return {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
 
 

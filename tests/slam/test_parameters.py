@@ -16,7 +16,7 @@ CONFIG = Config.from_mapping(
         "optimization": {"optimize_every_n_nodes": 60},
     }
 )
-ELSEWHERE = {"glass", "sonar"}
+ELSEWHERE = {"glass", "sonar", "volume"}
 """Sections that are read by other parts."""
 
 
