@@ -12,6 +12,7 @@ from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
 from glassslam.matching.gradient import MatchResult, match_scan
 from glassslam.matching.profile_kernels import flat_reach
 from glassslam.records import FloatArray
+from glassslam.slam.hold_kernels import known_share
 from glassslam.slam.neighbourhood import Neighbourhood
 
 _DIRECT_LINEAR, _DIRECT_ANGULAR = 0.25, 0.1
@@ -22,6 +23,9 @@ _AMBIGUOUS_REACH = 0.5
 _AMBIGUOUS_SIGMA = 20.0
 _LEAST_POINTS = 50
 _CLEARLY_BETTER = 0.03
+_LEAST_KNOWN = 0.5
+_WIDE_RESIDUAL, _UNKNOWN_RESIDUAL = 0.46, 0.49
+_EXPECTED_DISTANCE, _EXPECTED_TURN = 1.0, 0.3
 _ROUNDING = 1e-9
 
 
@@ -62,7 +66,7 @@ class Closure:
     candidate : Candidate
         The search.
     rejected : str
-        Empty, or the reason: "few points", "low score", "poor fit", "inconsistent".
+        Empty, or the reason: "few points", "low score", "poor fit", "inconsistent", "ambiguous".
     anchor_from_node : ndarray of float64, shape (3,)
         Measured pose of the node in the frame of the anchor.
     covariance : ndarray of float64, shape (3, 3)
@@ -79,36 +83,6 @@ class Closure:
     covariance: FloatArray
     ambiguous: bool = False
     searched: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class SearchOutcome:
-    """What the report needs of a search.
-
-    Attributes
-    ----------
-    node, anchor : int
-        The node, and the node of the submap nearest to it.
-    rejected : str
-        As in `Closure`.
-    ambiguous : bool
-        As in `Closure`.
-    distance : float
-        How far from the anchor the node was expected, m.
-    """
-
-    node: int
-    anchor: int
-    rejected: str
-    ambiguous: bool
-    distance: float
-
-    @classmethod
-    def of(cls, closure: Closure) -> "SearchOutcome":
-        """Of a closure found or rejected."""
-        candidate = closure.candidate
-        distance = math.hypot(*candidate.anchor_from_node[:2].tolist())
-        return cls(candidate.node, candidate.anchor, closure.rejected, closure.ambiguous, distance)
 
 
 def close(
@@ -146,13 +120,15 @@ def close(
     match = _located(candidate, scene, grid, matcher, config)
     if match is None:
         return refuse("low score")
-    if match.residual > min(max(0.45, 1.1 * scene.residual + 0.03), config.max_residual):
+    if match.residual > min(_worst_residual(candidate, scene, match.pose, config), config.max_residual):
         return refuse("poor fit")
     measured = between(candidate.anchor_in_local, match.pose)
     covariance, ambiguous = _uncertainty(match, scene, grid, candidate.anchor_in_local, config)
-    error = compose(inverse(candidate.anchor_from_node), measured)
-    if error @ np.linalg.solve(candidate.covariance + covariance, error) > chi_square_limit:
-        return refuse("inconsistent")
+    objection = _objection(candidate, scene, grid, match.pose, measured, covariance, config, chi_square_limit)
+    if ambiguous and is_wide(candidate, config) and not _is_expected(candidate, match.pose):
+        objection = "ambiguous"
+    if objection:
+        return refuse(objection)
     return Closure(candidate, "", measured, covariance, ambiguous, searched)
 
 
@@ -182,7 +158,7 @@ def _located(
     if matcher is None:
         return _refined(scene, grid, guess)
     center = guess
-    if is_wide(candidate, config) and candidate.linear_window >= config.max_linear_window:
+    if is_wide(candidate, config):
         # no window reaches all the places the graph allows: look where the submap was seen from
         center = np.array([*candidate.anchor_in_local[:2], guess[2]])
     found = matcher.match(
@@ -195,6 +171,42 @@ def _located(
     if searched is None:
         return near
     return searched if searched.residual < near.residual - _CLEARLY_BETTER else near
+
+
+def _worst_residual(
+    candidate: Candidate, scene: Neighbourhood, pose: FloatArray, config: LoopClosureConfig
+) -> float:
+    """Residual up to which a place is believed; after a wide search, better than that of unknown ground."""
+    usual = max(0.45, 1.1 * scene.residual + 0.03)
+    if not is_wide(candidate, config):
+        return usual
+    return min(usual, _UNKNOWN_RESIDUAL) if _is_expected(candidate, pose) else _WIDE_RESIDUAL
+
+
+def _is_expected(candidate: Candidate, pose: FloatArray) -> bool:
+    """Whether a pose in the local frame is about where the graph has it."""
+    off = between(compose(candidate.anchor_in_local, candidate.anchor_from_node), pose)
+    return bool(math.hypot(off[0], off[1]) < _EXPECTED_DISTANCE and abs(off[2]) < _EXPECTED_TURN)
+
+
+def _objection(
+    candidate: Candidate,
+    scene: Neighbourhood,
+    grid: ProbabilityGrid,
+    pose: FloatArray,
+    measured: FloatArray,
+    covariance: FloatArray,
+    config: LoopClosureConfig,
+    chi_square_limit: float,
+) -> str:
+    """Why a place that fits is not believed; empty where it is."""
+    if is_wide(candidate, config):
+        # no covariance of first order holds so far off: other closures are asked instead of the graph
+        known = known_share(grid.cells, grid.origin, 1.0 / grid.resolution, scene.fine, pose)
+        return "poor fit" if known < _LEAST_KNOWN else ""
+    error = compose(inverse(candidate.anchor_from_node), measured)
+    distance = error @ np.linalg.solve(candidate.covariance + covariance, error)
+    return "inconsistent" if distance > chi_square_limit else ""
 
 
 def _refined(scene: Neighbourhood, grid: ProbabilityGrid, guess: FloatArray) -> MatchResult:

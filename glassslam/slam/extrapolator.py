@@ -137,22 +137,25 @@ class PoseExtrapolator:
         if event is Event.NONE or not _has_begun_anew(self._odometry_pose, odometry_pose):
             moved = self._odometry_motion(odometry_pose, step)
         motion = moved if moved is not None else self._turn_by_imu(stamp, coasting)
-        alternative = None
-        if moved is not None and coasting is not None:
-            gap = moved - coasting
-            if math.hypot(gap[0], gap[1]) > 0.1 or abs(gap[2]) > 0.06:
-                alternative = compose(self._pose, coasting)
         twist = motion / step if _is_usual(step) else np.zeros(3)
         return Prediction(
             compose(self._pose, motion),
             math.hypot(motion[0], motion[1]),
             abs(float(motion[2])),
             twist,
-            alternative,
+            self._alternative(moved, coasting),
             moved is not None,
             not 0.0 < stamp - self._stamp < _LONGEST_STEP,
             event | (Event.ODOMETRY_JUMP if self.jumps > jumps else Event.NONE),
         )
+
+    def _alternative(self, moved: FloatArray | None, coasting: FloatArray | None) -> FloatArray | None:
+        """Where constant velocity leads, if that is elsewhere than where the odometry does."""
+        if moved is None or coasting is None:
+            return None
+        gap = moved - coasting
+        is_elsewhere = math.hypot(gap[0], gap[1]) > 0.1 or abs(gap[2]) > 0.06
+        return compose(self._pose, coasting) if is_elsewhere else None
 
     def _break_before(self, stamp: float) -> Event:
         """Whether the clock was set, or nothing is known of a time long enough to be carried elsewhere."""

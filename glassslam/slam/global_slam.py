@@ -16,11 +16,12 @@ from glassslam.posegraph import PoseGraph
 from glassslam.posegraph.consistency import prune_closures
 from glassslam.posegraph.storage import LOOP
 from glassslam.records import FloatArray
-from glassslam.slam.closure import Candidate, Closure, SearchOutcome
+from glassslam.slam.closure import Candidate, Closure
 from glassslam.slam.journal import Journal, NoJournal
 from glassslam.slam.loop_closing import LoopSearcher, select
 from glassslam.slam.node import Node
 from glassslam.slam.rejoin import WEAK_STEP, move_stretches
+from glassslam.slam.search_outcome import SearchOutcome
 from glassslam.slam.stopwatch import Stages
 
 _LOOK_AHEAD = 45

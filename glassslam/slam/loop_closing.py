@@ -55,8 +55,8 @@ def select(
         spread = 3.0 * math.sqrt(max(covariance[0, 0], covariance[1, 1]))
         if distance > _NEAR + spread:
             continue
-        turn = 3.0 * math.sqrt(covariance[2, 2])
-        is_across = any(anchor < begin <= node for begin in begins)
+        turn = 3.0 * math.sqrt(covariance[2, 2]) + _ANGULAR_MARGIN
+        is_wide_open = turn > widest and any(anchor < begin <= node for begin in begins)
         chosen.append(
             Candidate(
                 node,
@@ -64,8 +64,10 @@ def select(
                 submap_index,
                 nodes[anchor].pose_in_local,
                 between(poses[anchor], poses[node]),
-                min(config.max_linear_window, spread + _LINEAR_MARGIN),
-                min(math.pi if is_across else widest, turn + _ANGULAR_MARGIN),
+                config.max_linear_window
+                if is_wide_open
+                else min(config.max_linear_window, spread + _LINEAR_MARGIN),
+                math.pi if is_wide_open else min(widest, turn),
                 covariance,
             )
         )

@@ -234,14 +234,15 @@ class Mapper:
         )
 
     def _settled(self) -> SettledRun:
+        tracks = self._tracks()
         return SettledRun(
             config=self._config,
             nodes=tuple(self._global.nodes),
             submaps=tuple(self._global.submaps),
             constraints=self._global.graph.constraints,
-            tracks=self._tracks(),
+            tracks=tracks,
             statistics=run_statistics(
-                self._tally, self._extrapolator, self._local, self._global, self._glass.choice
+                self._tally, self._extrapolator, self._local, self._global, self._glass.choice, tracks
             ),
             glass=self._glass.findings(),
             stages=self._stages,

@@ -24,7 +24,7 @@ from glassslam.slam.node import Node
 WEAK_STEP = (3.0, 3.0, 1.05)
 """Standard deviation of the step over a break, m, m and rad: three times that is any direction."""
 _SAME_PLACE, _SAME_HEADING = 1.0, 0.15
-_FEW_SEARCHES = 8
+_FEW_SEARCHES, _LEAST_VOTES = 8, 3
 
 
 def beginnings(nodes: Sequence[Node]) -> list[int]:
@@ -62,7 +62,8 @@ def agreeing(closures: Sequence[Closure], nodes: Sequence[Node], config: LoopClo
         found = [k for k in tried if not closures[k].rejected]
         start = nodes[begins[stretch]].pose_in_local
         places = np.array([_begin_seen_by(closures[k], nodes, start) for k in found]).reshape(-1, 3)
-        for k, stays in zip(found, _majority(places, alone=len(tried) <= _FEW_SEARCHES), strict=True):
+        least = 1 if len(tried) <= _FEW_SEARCHES else _LEAST_VOTES
+        for k, stays in zip(found, _majority(places, least), strict=True):
             if not stays:
                 out[k] = replace(closures[k], rejected="inconsistent")
     return out
@@ -75,14 +76,15 @@ def _begin_seen_by(closure: Closure, nodes: Sequence[Node], start: FloatArray) -
     return compose(node, between(nodes[candidate.node].pose_in_local, start))
 
 
-def _majority(poses: FloatArray, *, alone: bool) -> NDArray[np.bool_]:
-    """Which poses (k, 3) belong to the largest group around one of them; `alone`: whether one is a group."""
-    if len(poses) < 2:
-        return np.full(len(poses), alone)
+def _majority(poses: FloatArray, least: int) -> NDArray[np.bool_]:
+    """Which poses (k, 3) belong to the largest group around one of them, if it has `least` members."""
+    if len(poses) == 0:
+        return np.zeros(0, dtype=np.bool_)
     gap = between(poses[:, None], poses[None])
     near = (np.hypot(gap[..., 0], gap[..., 1]) < _SAME_PLACE) & (np.abs(gap[..., 2]) < _SAME_HEADING)
     votes = near.sum(axis=1)
-    return np.asarray(near[votes.argmax()] & (votes.max() > 1))
+    is_enough = votes.max() >= (least if len(poses) == 1 else max(least, 2))
+    return np.asarray(near[votes.argmax()] & is_enough)
 
 
 def joined(begins: Sequence[int], ends: NDArray[np.int64]) -> NDArray[np.int64]:

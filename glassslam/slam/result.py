@@ -45,6 +45,39 @@ class StageTime:
     cpu: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Degeneracy:
+    """A stretch of a run that the scans did not decide, or where something was bridged.
+
+    Attributes
+    ----------
+    kind : str
+        "featureless", "unmatched", "low overlap", "poor fit", "lost", "odometry jump", "clock jump" or
+        "silence" (with ", not rejoined" where the map is in pieces), "closure rejected",
+        "closure inconsistent", "closure ambiguous" or "closure taken out".
+    first_scan, last_scan : int
+        Numbers of the scans in the trajectory.
+    start, end : float
+        Their stamps, s.
+    start_place, end_place : tuple of float
+        Where the base was in the map, x and y, m.
+    length : float
+        Way travelled between, m.
+    text : str
+        What happened, in words.
+    """
+
+    kind: str
+    first_scan: int
+    last_scan: int
+    start: float
+    end: float
+    start_place: tuple[float, float]
+    end_place: tuple[float, float]
+    length: float
+    text: str
+
+
 @dataclass(slots=True)
 class RunStatistics:
     """Counts and times of a run, as they go into report.json.
@@ -77,6 +110,11 @@ class RunStatistics:
         What of the recording could not be read.
     solver_failures : int
         Times the pose graph could not be optimised; the poses of before were kept.
+    tracking : dict
+        What local SLAM had to do beside plain matching -> number of times; `closures_ambiguous`, which leave
+        a direction free; and `stretches` of the run.
+    degeneracies : list of Degeneracy
+        What a reader of the map should know of, in the order of the recording.
     """
 
     scans_read: int = 0
@@ -96,6 +134,8 @@ class RunStatistics:
     warnings: list[str] = field(default_factory=list)
     damage: list[Damage] = field(default_factory=list)
     solver_failures: int = 0
+    tracking: dict[str, int] = field(default_factory=dict)
+    degeneracies: list[Degeneracy] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)

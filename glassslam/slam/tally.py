@@ -3,12 +3,19 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from glassslam.posegraph.storage import LOOP
 from glassslam.records import LaserScan
+from glassslam.slam.closure_degeneracy import find_degeneracies
+from glassslam.slam.degeneracy import Trace, summarised
 from glassslam.slam.extrapolator import PoseExtrapolator
 from glassslam.slam.glass_choice import DetectorChoice
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalSlam
+from glassslam.slam.rejoin import beginnings
 from glassslam.slam.result import RunStatistics
+from glassslam.slam.trajectory import PoseTracks
 
 _FEW = 0.1
 
@@ -55,8 +62,10 @@ def run_statistics(
     local: LocalSlam,
     world: GlobalSlam,
     glass: DetectorChoice,
+    tracks: PoseTracks,
 ) -> RunStatistics:
     """Everything the report tells of a finished run."""
+    found = find_degeneracies(_trace(extrapolator, local, world, tracks))
     used, taken_out = world.closures()
     rejected = dict(sorted(world.rejected.items()))
     if taken_out:
@@ -77,8 +86,47 @@ def run_statistics(
         glass_detector=glass.name,
         glass_reason=glass.reason,
         solver_failures=world.solver_failures,
-        warnings=[*_warnings(tally, extrapolator, local), *_failures(world.solver_failures), *glass.warnings],
+        tracking=_tracking(extrapolator, local, world),
+        degeneracies=found,
+        warnings=[
+            *_warnings(tally, extrapolator, local),
+            *summarised(found),
+            *_failures(world.solver_failures),
+            *glass.warnings,
+        ],
     )
+
+
+def _trace(extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam, tracks: PoseTracks) -> Trace:
+    edges = world.graph.edges
+    is_loop = edges.kinds == LOOP
+    return Trace(
+        stamps=tracks.final.stamps,
+        local=tracks.local.poses,
+        final=tracks.final.poses,
+        matches=local.log.arrays(),
+        node_scans=np.array([node.scan for node in world.nodes], dtype=np.int64),
+        begins=beginnings(world.nodes),
+        searches=world.outcomes,
+        used=edges.ends[is_loop & edges.enabled],
+        taken_out=edges.ends[is_loop & ~edges.enabled],
+        with_odometry=len(extrapolator.odometry) > 0,
+    )
+
+
+def _tracking(extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam) -> dict[str, int]:
+    now = local.tracking
+    return {
+        "searches": now.searches,
+        "searches_taken": now.searches_taken,
+        "relocalisations": now.relocalisations,
+        "relocalised": now.relocalised,
+        "coasted": now.coasted,
+        "unmatched": now.unmatched,
+        "odometry_jumps": extrapolator.jumps,
+        "closures_ambiguous": world.ambiguous,
+        "stretches": len(beginnings(world.nodes)) + 1,
+    }
 
 
 def _failures(count: int) -> list[str]:

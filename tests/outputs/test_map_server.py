@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from glassslam.errors import OutputError
+from glassslam.errors import GridError, OutputError
 from glassslam.outputs import read_map, trinary_image, write_map
 from glassslam.slam.result import OccupancyMap
 
@@ -96,7 +96,7 @@ def test_negated_maps_are_read_negated(draw_map, tmp_path):
 
 
 def test_empty_map_is_refused(tmp_path):
-    with pytest.raises(OutputError, match="the map has no cells"):
+    with pytest.raises(GridError, match="the map has no cells"):
         write_map(OccupancyMap(np.empty((0, 3), np.float32), 0.05, (0.0, 0.0)), tmp_path / "map.yaml")
     assert list(tmp_path.iterdir()) == []
 

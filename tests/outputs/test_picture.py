@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glassslam.errors import OutputError
+from glassslam.errors import GridError
 from glassslam.outputs.picture import grey_levels, path_pixels, scale_bar_length, write_picture
 from glassslam.records import Trajectory
 from glassslam.slam.result import OccupancyMap
@@ -65,7 +65,7 @@ def test_same_map_same_bytes(draw_map, tmp_path):
 
 
 def test_an_empty_map_is_refused(tmp_path):
-    with pytest.raises(OutputError, match="the map has no cells"):
+    with pytest.raises(GridError, match="the map has no cells"):
         write_picture(OccupancyMap(np.empty((0, 0), np.float32), 1.0, (0, 0)), NOWHERE, tmp_path / "m.png")
 
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from slam_worlds import CORRIDOR, ROOM, Lidar, range_data
+from slam_worlds import CORRIDOR, RING, ROOM, Lidar, range_data
 
 from glassslam.config import LoopClosureConfig
 from glassslam.geometry import between, compose, transform_points
 from glassslam.grid.probability_grid import ProbabilityGrid
 from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
-from glassslam.slam.closure import Candidate, close, needs_search
+from glassslam.slam.closure import Candidate, close, is_wide, needs_search
 from glassslam.slam.neighbourhood import neighbourhood
 from glassslam.slam.node import Node
 
@@ -148,3 +148,33 @@ def test_a_grid_without_walls_closes_nothing():
     matcher = BranchAndBoundMatcher(empty, 3.0)
     found = close(candidate(ANCHOR, PLACE), scene_of(ROOM, PLACE), empty, matcher, CONFIG, LIMIT)
     assert found.rejected == "low score"
+
+
+class TestWide:
+    """Searches over a break, in which the robot may have been turned and carried."""
+
+    def search(self, grid, world, place, error):
+        wide = candidate(ANCHOR, place, error=error, sigma=9.0, turn_sigma=1.05, window=8.0, turn=np.pi)
+        assert is_wide(wide, CONFIG)
+        return close(wide, scene_of(world, place), grid, BranchAndBoundMatcher(grid, 8.0), CONFIG, LIMIT)
+
+    @pytest.mark.parametrize("error", [(0, 0, 0), (9.0, -12.0, 3.0), (3.0, 4.0, -2.0)])
+    def test_the_place_is_found_however_wrong_the_guess(self, room, error):
+        found = self.search(room, ROOM, PLACE, error)
+        assert found.rejected == ""
+        off = between(between(np.array(ANCHOR), np.array(PLACE)), found.anchor_from_node)
+        assert np.abs(off[:2]).max() < 0.03
+        assert abs(off[2]) < 0.01
+
+    def test_where_the_expected_place_fits_as_well_it_is_kept(self, corridor):
+        """A corridor fits half turned and anywhere along it."""
+        place = (1.0, 1.0, 0.0)
+        expected = candidate((1.0, 1.0, 0.0), place, sigma=9.0, turn_sigma=1.05, window=8.0, turn=np.pi)
+        found = close(
+            expected, scene_of(CORRIDOR, place), corridor, BranchAndBoundMatcher(corridor, 8.0), CONFIG, LIMIT
+        )
+        assert np.abs(found.anchor_from_node).max() < 0.1
+
+    def test_another_building_is_refused(self, room):
+        found = self.search(room, 1.7 * RING, (8.0, 2.1, 0.3), (0, 0, 0))
+        assert found.rejected == "poor fit"

@@ -76,3 +76,12 @@ def test_without_nodes_the_poses_are_copied(count):
     actual = corrected_poses(poses, np.empty(0, dtype=np.int64), nothing, nothing)
     np.testing.assert_array_equal(actual, poses)
     assert actual is not poses
+
+
+def test_scans_before_a_break_go_along_with_the_nodes_before_it_only():
+    local = np.array([[0.1 * k, 0.0, 0.0] for k in range(6)])
+    scans, begins = np.array([0, 1, 4]), np.array([False, False, True])
+    moved = local[scans] + np.array([[0, 0, 0], [0, 0, 0], [5.0, 7.0, 0]])
+    poses = corrected_poses(local, scans, local[scans], moved, begins)
+    assert_same(poses[:4], local[:4])
+    assert_same(poses[4:], local[4:] + np.array([5.0, 7.0, 0.0]))

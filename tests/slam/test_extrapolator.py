@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from glassslam.geometry import compose, inverse
-from glassslam.records import Imu
+from glassslam.records import Imu, Odometry
 from glassslam.slam.extrapolator import PoseExtrapolator
+from glassslam.slam.tracking import Event
 
 START = np.array([5.0, 1.0, math.pi / 2])
 
@@ -174,3 +175,63 @@ class TestSweeps:
             extrapolator.add_pose(k * 0.1, matched, matched, 0.05, np.array([3.0, 0.0, 0.0]))
         expected = extrapolator.predict(0.3, np.array([0.25, 0.0, 0.0]))
         np.testing.assert_allclose(expected.pose_in_local, [0.25, 0.0, 0.0])
+
+
+class TestBreaks:
+    """After which the robot may be anywhere."""
+
+    def after(self, *stamps, odometry=()):
+        """An extrapolator that has seen scans, and odometry in between."""
+        extrapolator = PoseExtrapolator()
+        for stamp in odometry:
+            extrapolator.add_odometry(Odometry(stamp, (0.1 * stamp, 0.0, 0.0)))
+        for stamp in stamps:
+            extrapolator.add_pose(stamp, np.array([0.1 * stamp, 0.0, 0.0]), None)
+        return extrapolator
+
+    @pytest.mark.parametrize(
+        ("stamp", "event"),
+        [
+            (10.2, Event.NONE),
+            (15.0, Event.NONE),
+            (15.2, Event.GAP),
+            (1e9, Event.GAP),
+            (9.2, Event.NONE),
+            (9.0, Event.CLOCK_BACK),
+            (-3600.0, Event.CLOCK_BACK),
+        ],
+    )
+    def test_long_silence_and_clocks_that_are_set(self, stamp, event):
+        assert self.after(9.9, 10.0, 10.1).predict(stamp, None).event == event
+
+    def test_the_first_scan_follows_nothing(self):
+        assert PoseExtrapolator().predict(5.0, None).event == Event.NONE
+
+    def test_a_slow_recording_is_not_silent(self):
+        slow = self.after(0.0, 8.0, 16.0)
+        assert slow.predict(24.0, None).event == Event.NONE
+        assert slow.predict(100.0, None).event == Event.GAP
+
+    def test_odometry_that_goes_on_knows_the_way(self):
+        wheels = np.arange(9.0, 40.0, 0.5)
+        assert self.after(10.0, 10.1, odometry=wheels).predict(30.0, None).event == Event.NONE
+        assert self.after(10.0, 10.1, odometry=[9.0, 10.0, 30.0]).predict(30.0, None).event == Event.GAP
+
+    def test_a_robot_drives_on_while_its_clock_is_set(self):
+        expected = self.after(10.0, 10.1).predict(-3600.0, None)
+        np.testing.assert_allclose(expected.pose_in_local, [1.02, 0.0, 0.0])
+
+    def test_odometry_from_zero_again_says_nothing_of_the_break(self):
+        extrapolator = PoseExtrapolator()
+        for k in range(2):
+            extrapolator.add_pose(10.0 + 0.1 * k, np.array([3.0, 4.0, 0.0]), np.array([9.0, 9.0, 1.0]))
+        expected = extrapolator.predict(60.0, np.zeros(3))
+        np.testing.assert_allclose(expected.pose_in_local, [3.0, 4.0, 0.0])
+        assert not expected.measured
+        assert extrapolator.predict(60.0, np.array([9.5, 9.0, 1.0])).measured
+
+    def test_a_jump_of_the_odometry_is_an_event(self):
+        extrapolator = PoseExtrapolator()
+        extrapolator.add_pose(10.0, np.zeros(3), np.zeros(3))
+        assert extrapolator.predict(10.1, np.array([50.0, 0.0, 0.0])).event == Event.ODOMETRY_JUMP
+        assert extrapolator.predict(10.1, np.array([0.1, 0.0, 0.0])).event == Event.NONE

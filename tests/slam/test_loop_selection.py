@@ -1,6 +1,7 @@
 """Which loop closures are searched for, and where."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from glassslam.geometry import between
 from glassslam.grid.probability_grid import ProbabilityGrid
 from glassslam.grid.submap import Submap
 from glassslam.posegraph import PoseGraph
+from glassslam.slam.closure import is_wide
 from glassslam.slam.loop_closing import LoopSearcher, select
 from glassslam.slam.node import Node
+from glassslam.slam.rejoin import WEAK_STEP
 
 CONFIG = LoopClosureConfig(min_node_gap=40, sampling_stride=5, max_searches_per_submap=4)
 
@@ -154,3 +157,55 @@ class TestSearcher:
         assert wide is not narrow
         assert wide.max_linear_window >= 10.0
         assert wide.max_linear_window <= CONFIG.max_linear_window + 0.11
+
+
+@pytest.fixture
+def broken():
+    """A loop whose last third begins a new stretch, hardly held to what was before."""
+    poses = round_trip(1.2)[::10]
+    begin = len(poses) * 2 // 3
+    graph = PoseGraph()
+    graph.add_poses(poses)
+    steps = between(poses[:-1], poses[1:])
+    for k, step in enumerate(steps):
+        noise = WEAK_STEP if k + 1 == begin else (0.02, 0.02, 0.002)
+        graph.add_constraints([k], [k + 1], step[None], np.diag(1.0 / np.array(noise)), "odometry")
+    nodes = [replace(node, begins=node.index == begin) for node in nodes_at(poses)]
+    return (poses, graph, nodes), begin
+
+
+class TestAcrossABreak:
+    """Where the robot may have been carried and turned."""
+
+    def test_searches_begin_at_once_and_look_all_around(self, broken):
+        loop, begin = broken
+        found = chosen(loop, [submap(0, range(begin - 12, begin), loop[0])])
+        assert min(candidate.node for candidate in found) == begin
+        assert all(candidate.angular_window == math.pi for candidate in found)
+        assert all(candidate.linear_window == CONFIG.max_linear_window for candidate in found)
+        assert all(is_wide(candidate, CONFIG) for candidate in found)
+
+    def test_within_a_stretch_all_is_as_usual(self, broken):
+        loop, begin = broken
+        found = chosen(loop, [submap(0, range(4), loop[0])], last=begin)
+        assert not any(is_wide(candidate, CONFIG) for candidate in found)
+
+    def test_a_stretch_that_is_joined_is_searched_for_as_usual(self, broken):
+        (poses, graph, nodes), begin = broken
+        one = chosen((poses, graph, nodes), [submap(0, range(begin - 12, begin), poses)])[0]
+        joined = PoseGraph()
+        joined.add_poses(poses)
+        edges = graph.edges
+        joined.add_constraints(edges.ends[:, 0], edges.ends[:, 1], edges.measured, edges.weights, "odometry")
+        step = between(poses[one.anchor], poses[one.node])
+        joined.add_constraints([one.anchor], [one.node], step[None], 50.0 * np.eye(3), "loop")
+        found = chosen((poses, joined, nodes), [submap(0, range(begin - 12, begin), poses)])
+        assert found
+        assert not any(is_wide(candidate, CONFIG) for candidate in found)
+
+    def test_wide_searches_are_few_and_spread_over_the_submaps(self, broken):
+        loop, begin = broken
+        submaps = [submap(k, range(begin - 12, begin), loop[0]) for k in range(20)]
+        found = chosen(loop, submaps)
+        assert len(found) == 24
+        assert {candidate.submap for candidate in found} == set(range(20))

@@ -115,6 +115,13 @@ class TestOdometryTrack:
         assert (len(track), track.dropped) == (2, 1)
         np.testing.assert_allclose(track.pose_at(1.5), [0.5, 0, 0])
 
+    def test_silence_counts_from_the_start_and_to_the_end_as_well(self):
+        track = track_of((1.0, 0, 0, 0), (2.0, 0, 0, 0), (6.0, 0, 0, 0))
+        assert track.longest_silence(0.5, 2.5) == pytest.approx(1.0)
+        assert track.longest_silence(1.5, 7.0) == pytest.approx(4.0)
+        assert track.longest_silence(6.0, 9.0) == pytest.approx(3.0)
+        assert OdometryTrack().longest_silence(1.0, 9.0) == pytest.approx(8.0)
+
     def test_fast_odometry_reaches_back_to_slow_scans(self):
         track = track_of(*((0.001 * k, 0.001 * k, 0.0, 0.0) for k in range(16_000)))
         np.testing.assert_allclose(track.pose_at(0.5), [0.5, 0.0, 0.0], atol=1e-9)
