@@ -36,6 +36,8 @@ def explained(path: Path) -> Iterator[None]:
         if "locked" in str(error):
             raise OutputError(f"another program is using {path}", "wait for it") from error
         raise damaged(path, str(error)) from error
+    except UnicodeDecodeError as error:  # SQLite quotes what it has found in the file
+        raise damaged(path, "a text in it is none") from error
 
 
 def damaged(path: Path, why: str) -> SessionError:
@@ -86,15 +88,19 @@ def open_existing(path: Path) -> sqlite3.Connection:
     with explained(path):
         database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
         try:
-            # a process that ends while it makes a session leaves one that is undone when it is opened
-            if database.execute("PRAGMA user_version").fetchone()[0] < 1:
-                raise _begun(path)
+            _check_filled(database, path)
             _set_up(database)
             _bring_up(database, path)
         except BaseException:
             database.close()
             raise
     return database
+
+
+def _check_filled(database: sqlite3.Connection, path: Path) -> None:
+    # a process that ends while it makes a session leaves one that is undone when it is opened
+    if database.execute("PRAGMA user_version").fetchone()[0] < 1:
+        raise _begun(path)
 
 
 def _bring_up(database: sqlite3.Connection, path: Path) -> None:

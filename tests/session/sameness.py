@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 
 
-def differences(a, b, at="value"):
+def differences(a, b, at="value"):  # noqa: PLR0911  (one for every kind of value)
     """Where two values differ: types, lengths, keys, or any bit of a number."""
     if type(a) is not type(b):
         return [f"{at}: {type(a).__name__} against {type(b).__name__}"]

@@ -24,6 +24,18 @@ from glassslam.slam import mapper
 
 PROGRAM = [sys.executable, "-c", "import sys; from glassslam.cli import main; sys.exit(main())"]
 
+_RESTING = """
+import sys, time
+from glassslam.cli import main
+from glassslam.slam.mapper import Mapper
+place = Mapper._place
+def resting(self, timed):
+    time.sleep({pause})
+    return place(self, timed)
+Mapper._place = resting
+sys.exit(main())
+"""
+
 _CORNERS = [(1.25, 1.25), (14.75, 1.25), (14.75, 10.75), (1.25, 10.75), (1.25, 1.25), (6.0, 1.25)]
 PATH = drive(*_CORNERS, step=0.2)
 """Once around the corridor of RING and on, so that the loop closes."""
@@ -36,10 +48,10 @@ WORDS = [
 """Submaps and rounds of searches as small as the run."""
 
 
-def write_ring(bag):
-    """The recording of a lidar with intensities and of wheels that err, on PATH."""
+def write_ring(bag, path=PATH):
+    """The recording of a lidar with intensities and of wheels that err, on PATH or another one."""
     random = np.random.default_rng(3)
-    wheels = odometry(PATH, scale=1.01, drift=0.004)
+    wheels = odometry(path, scale=1.01, drift=0.004)
 
     def bright(record):
         if not isinstance(record, LaserScan):
@@ -47,7 +59,7 @@ def write_ring(bag):
         strength = random.uniform(500, 3500, len(record.ranges)).astype(np.float32)
         return replace(record, intensities=strength)
 
-    write_rosbag1(map(bright, recording(RING, PATH, wheels, beams=240)), bag)
+    write_rosbag1(map(bright, recording(RING, path, wheels, beams=240)), bag)
     return bag
 
 
@@ -100,6 +112,11 @@ def session_files(folder):
     return [path for path in folder.iterdir() if path.name.startswith(SESSION_FILE)]
 
 
+def rows_of(database, table):
+    """Number of rows of a table."""
+    return database.execute(f"SELECT count(*) FROM {table}").fetchone()[0]  # noqa: S608  (own names only)
+
+
 def snapshot(folder, target):
     """What a process killed in this moment would leave of a session."""
     target.mkdir(parents=True)
@@ -108,10 +125,11 @@ def snapshot(folder, target):
     return target
 
 
-def start(words, folder, **options):
-    """`glassslam` in a process of its own."""
+def start(words, folder, pause=0.0, **options):
+    """`glassslam` in a process of its own, which may rest after every scan, s."""
+    program = [sys.executable, "-c", _RESTING.format(pause=pause)] if pause else PROGRAM
     return subprocess.Popen(
-        [*PROGRAM, *map(str, words)],
+        [*program, *map(str, words)],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options,
     )  # fmt: skip
 

@@ -4,7 +4,7 @@ import shutil
 import sqlite3
 
 import pytest
-from session_worlds import WORDS, assert_same_results, interrupted, results, write_ring
+from session_worlds import WORDS, assert_same_results, interrupted, results, rows_of, write_ring
 
 from glassslam.cli import main
 from glassslam.errors import SessionError
@@ -34,6 +34,10 @@ def session(waiting, tmp_path):
     """A copy of its session, in a directory of its own."""
     (tmp_path / "run.partial").mkdir()
     return shutil.copy(waiting / "run.partial" / "session.db", tmp_path / "run.partial" / "session.db")
+
+
+FOREIGN = "is no session of glassslam (if it was one that is damaged: glassslam recover)"
+BEGUN = "is empty: the run ended as it began (map the recording again)"
 
 
 def changed(path, statement):
@@ -77,20 +81,20 @@ def test_a_database_of_another_program(session, capsys):
 def test_a_file_of_another_kind(session, capsys, content):
     session.write_bytes(content)
     assert not is_session(session)
-    assert refused(session, capsys) == f"{session} is no session of glassslam"
+    assert refused(session, capsys) == f"{session} {FOREIGN}"
 
 
 def test_an_empty_file_is_a_run_that_ended_as_it_began(session, capsys):
     session.write_bytes(b"")
     assert not is_session(session)
-    assert refused(session, capsys) == f"{session} is empty: the run ended as it began (map the recording again)"
+    assert refused(session, capsys) == f"{session} {BEGUN}"
 
 
 def test_a_session_that_was_never_filled(session, capsys):
     """What opening makes of a process that was killed while it made the file."""
     session.unlink()
     changed(session, f"PRAGMA application_id = {schema.APPLICATION_ID}")
-    assert refused(session, capsys) == f"{session} is empty: the run ended as it began (map the recording again)"
+    assert refused(session, capsys) == f"{session} {BEGUN}"
 
 
 def test_a_directory_in_its_place(tmp_path, capsys):
@@ -130,7 +134,7 @@ def test_a_session_that_was_cut(session, capsys, name, length):
     session.write_bytes(content[: length(len(content))])
     told = refused(session, capsys)
     if name == "within the magic":
-        assert told == f"{session} is no session of glassslam"
+        assert told == f"{session} {FOREIGN}"
     elif name == "within the header":
         assert told == f"{session} is damaged: it is cut off (save what there is: glassslam recover run)"
     else:
@@ -168,7 +172,7 @@ def test_a_session_that_does_not_tell_its_run(session, capsys, name, what):
 def test_a_byte_turned_anywhere_is_told_or_has_no_effect(session, whole, capsys):
     content, told = session.read_bytes(), 0
     run = session.parent.with_suffix("")
-    for place in range(4096 + 2048, len(content), 9 * 4096 + 77):
+    for place in range(4096 + 2048, len(content), 3 * 4096 + 77):
         spoilt = bytearray(content)
         spoilt[place] ^= 0x55
         session.write_bytes(spoilt)
@@ -183,7 +187,7 @@ def test_a_byte_turned_anywhere_is_told_or_has_no_effect(session, whole, capsys)
             told += 1
         for aside in session.parent.glob("session.db-*"):
             aside.unlink()
-    assert told > 3
+    assert told >= 3
 
 
 @pytest.fixture
@@ -224,8 +228,8 @@ def test_a_step_that_fails_leaves_the_file_as_it_was(session, version_2):
     with pytest.raises(SessionError, match="is damaged: no such table: of_nothing"):
         Session.open(session)
     assert version(session) == 1
-    with sqlite3.connect(session) as database:
-        assert database.execute("SELECT count(*) FROM nodes").fetchone()[0] > 0
+    database = sqlite3.connect(session)
+    assert rows_of(database, "nodes") > 0
     database.close()
     assert len(session.read_bytes()) == len(before)
 

@@ -58,9 +58,9 @@ def through_table():
     schema.create_tables(database)
 
     def write_and_read(table, row):
-        database.execute(f"DELETE FROM {table}")
+        database.execute(f"DELETE FROM {table}")  # noqa: S608  (own names only)
         schema.insert(database, table, [row])
-        return schema.unsealed(database.execute(f"SELECT * FROM {table}").fetchone())
+        return schema.unsealed(database.execute(f"SELECT * FROM {table}").fetchone())  # noqa: S608
 
     yield write_and_read
     database.close()
@@ -126,9 +126,9 @@ def closure_like(values):
 PINNED = {
     1: {
         "facts": "name value seal",
-        "scans": "number stamp x y theta residual points hold free_heading overlap how event doubtful returns "
-        "is_node usual_residual since_gap since_start in_doubt searches searches_taken relocalisations "
-        "relocalised coasted unmatched seal",
+        "scans": "number stamp x y theta residual points hold free_heading overlap how event doubtful "
+        "returns is_node usual_residual since_gap since_start in_doubt searches searches_taken "
+        "relocalisations relocalised coasted unmatched seal",
         "nodes": "number scan stamp x y theta sensor_x sensor_y residual doubtful begins returns free_ends "
         "ghosts seal",
         "rounds": "number searches seal",

@@ -16,7 +16,11 @@ from glassslam.simulation import Scene, find_scene, simulate, write_recording
 from glassslam.slam.result import MapResult
 
 CONFIG = gs.Config.from_mapping(
-    {"glass": {"scheme": "local"}, "submap": {"num_range_data": 12}, "sonar": {"scan_filter": {"enabled": True}}}
+    {
+        "glass": {"scheme": "local"},
+        "submap": {"num_range_data": 12},
+        "sonar": {"scan_filter": {"enabled": True}},
+    }
 )
 DAMAGE = (
     Damage("half.bag", 4096, 512, 10.5, None, 12, "checksum"),
