@@ -69,7 +69,7 @@ def salvage(path: Path, target: Path) -> Salvage:
     found = _rows(path)
     facts = found["facts"]
     if missing := [name for name in _NEEDED if name not in facts]:
-        raise SessionError(f"{path} cannot be saved: its {missing[0]} is lost", _ANEW)
+        raise SessionError(f"{path} cannot be saved: what tells its {missing[0]} is lost", _ANEW)
     scans, nodes = _beginning(found["scans"], found["nodes"])
     rounds, searches = _whole_rounds(found["rounds"], found["searches"])
     whole = len(scans) == len(found["scans"]) and _is_complete(facts, found["arrays"], len(nodes))

@@ -172,3 +172,26 @@ def test_names_that_the_terminal_cannot_show_are_escaped():
     )
     assert done.returncode == 1
     assert done.stderr == "error: cannot read caf\\xe9.tum: No such file or directory\n"
+
+
+def test_the_package_is_a_program_as_well():
+    done = subprocess.run(
+        [sys.executable, "-m", "glassslam", "--version"], check=False, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("glassslam 0.")
+
+
+def test_an_interruption_while_the_program_is_loaded_is_one_line():
+    code = (
+        "import sys\n"
+        "class Impatient:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'glassslam.cli.app':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Impatient())\n"
+        "from glassslam.cli import main\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "error: interrupted\n")
