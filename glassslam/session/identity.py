@@ -5,6 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from glassslam.errors import SessionError
+
 _BLOCK = 1 << 18
 _BLOCKS = 64
 
@@ -65,6 +67,46 @@ def digest(path: str | Path) -> str:
         for block in _blocks(file, size):
             total.update(block)
     return total.hexdigest()
+
+
+def checked(known: Sequence[Recorded], now: Sequence[str | Path] | None, sonar: Recorded | None) -> list[str]:
+    """Paths to read the recordings of a run from, when they are the same as ever.
+
+    Parameters
+    ----------
+    known : sequence of Recorded
+        What the run has read.
+    now : sequence of str or Path, optional
+        Where that is now; where it was when left out.
+    sonar : Recorded, optional
+        The second file with sonar readings.
+
+    Raises
+    ------
+    SessionError
+        One is missing or has changed.
+    """
+    paths = [recorded.found() for recorded in known] if now is None else [*map(str, now)]
+    if len(paths) != len(known):
+        raise SessionError(
+            f"the run reads {len(known)} recordings, not {len(paths)}", "name all, in their order"
+        )
+    for path, recorded in zip(paths, known, strict=True):
+        _check_same(path, recorded)
+    if sonar is not None:
+        _check_same(sonar.found(), sonar)
+    return paths
+
+
+def _check_same(path: str, known: Recorded) -> None:
+    try:
+        same = digest(path) == known.digest
+    except OSError as error:
+        raise SessionError(
+            f"cannot read {path}: {error.strerror}", "name the recording where it is now, before --resume"
+        ) from error
+    if not same:
+        raise SessionError(f"{path} is not the recording the run has read", "map it anew")
 
 
 def _files(path: Path) -> Sequence[Path]:

@@ -22,7 +22,7 @@ from glassslam.session.database import (
     reading,
     write_compact,
 )
-from glassslam.session.identity import Recorded, digest, identify
+from glassslam.session.identity import Recorded, checked, identify
 from glassslam.session.journal import SessionJournal
 from glassslam.session.schema import transaction
 from glassslam.session.store import (
@@ -176,19 +176,9 @@ class Session:
         Raises
         ------
         SessionError
-            One is missing, has changed, or was written by another version.
+            One is missing or has changed.
         """
-        now = [known.found() for known in self.recordings] if recordings is None else [*map(str, recordings)]
-        if len(now) != len(self.recordings):
-            raise SessionError(
-                f"the run reads {len(self.recordings)} recordings, not {len(now)}", "name all, in their order"
-            )
-        pairs = [*zip(now, self.recordings, strict=True)]
-        if self._sonar is not None:
-            pairs.append((self._sonar.found(), self._sonar))
-        for path, known in pairs:
-            _check_same(path, known)
-        return now
+        return checked(self.recordings, recordings, self._sonar)
 
     def change(self, config: Config, *, keep_findings: bool) -> None:
         """Take another configuration for what is still to be done.
@@ -369,14 +359,3 @@ def _text(value: str | Path | None) -> str | None:
     if value is None or not Path(value).is_file():
         return None if value is None else str(value)
     return str(Path(value).resolve())
-
-
-def _check_same(path: str, known: Recorded) -> None:
-    try:
-        same = digest(path) == known.digest
-    except OSError as error:
-        raise SessionError(
-            f"cannot read {path}: {error.strerror}", "name the recording where it is now, before --resume"
-        ) from error
-    if not same:
-        raise SessionError(f"{path} is not the recording the run has read", "map it anew")
