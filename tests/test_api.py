@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import glassslam as gs
-from glassslam import api
+from glassslam import api, finished
 from glassslam.errors import RecordingError
 from glassslam.records import LaserScan, Odometry, RecordingInfo
+from glassslam.slam.settled import SettledRun
 
 
 def scan(stamp):
@@ -37,21 +38,27 @@ def world(monkeypatch, tiny_result):
     notes = SimpleNamespace(records=[])
 
     class Mapper:
-        def __init__(self, config, base_from_laser):
-            notes.config, notes.base_from_laser = config, base_from_laser
+        is_hurried = False
+
+        def __init__(self, config, base_from_laser, journal):
+            notes.config, notes.base_from_laser, notes.journal = config, base_from_laser, journal
 
         def add(self, record):
             notes.records.append(record)
 
         def settle(self):
-            notes.settled = True
+            notes.settled = SettledRun(notes.config, (), (), (), None, None)
+            return notes.settled
 
-        def drawn(self, info=None, glass_sources=()):
-            notes.info = info
-            return tiny_result
+        def hurry(self):
+            self.is_hurried = True
 
         def close(self):
             notes.closed = True
+
+    def drawn(run, info, sources=()):
+        notes.drawn = (run, info)
+        return tiny_result
 
     def open_recording(paths, options):
         notes.source = Source(paths, options)
@@ -59,26 +66,44 @@ def world(monkeypatch, tiny_result):
 
     monkeypatch.setitem(sys.modules, "glassslam.slam.mapper", SimpleNamespace(Mapper=Mapper))
     monkeypatch.setattr(api, "open_recording", open_recording)
+    monkeypatch.setattr(finished, "draw", drawn)
     return notes
 
 
 def test_every_record_reaches_the_mapper_in_order(world, tiny_result):
-    assert gs.map_recording("run.clf") is tiny_result
+    assert gs.map_recording("run.clf").map is tiny_result.map
     assert [record.stamp for record in world.records] == [10.0, 10.5, 12.0, 11.5]
     assert world.source.paths == ["run.clf"]
     assert world.config == gs.Config()
     assert world.base_from_laser == (0.1, 0.2, 0.3)
-    assert world.info is world.source.info
+    assert world.drawn == (world.settled, world.source.info)
+    assert world.journal is None
 
 
 def test_results_of_one_run_can_be_drawn_again(world, tiny_result):
     told = []
     run = api.run_slam("run.clf", progress=told.append)
-    assert world.settled
-    assert not hasattr(world, "info")
+    assert run.settled is world.settled
+    assert not hasattr(world, "drawn")
     assert told[-1].stage == "done"
-    assert run.result() is run.result() is tiny_result
+    assert run.is_whole
+    assert run.result().statistics == run.result().statistics
+    assert run.with_config(gs.Config.from_mapping({"map": {"resolution": 0.2}})).config.map.resolution == 0.2
     assert len(world.records) == 4
+
+
+def test_a_run_told_to_hurry_reads_no_further(world, monkeypatch):
+    run = api.RunInProgress(Source(["run.clf"], None))
+
+    def hurrying(self):
+        yield scan(10.0)
+        run.hurry()
+        yield scan(12.0)
+
+    monkeypatch.setattr(Source, "records", hurrying)
+    assert not run.finished().is_whole
+    assert [record.stamp for record in world.records] == [10.0]
+    assert (run.scans, run.recorded_seconds) == (1, 0.0)
 
 
 def test_configuration_options_and_several_paths_are_handed_on(world):
