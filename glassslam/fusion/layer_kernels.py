@@ -1,4 +1,4 @@
-"""Kernel that counts where sonar readings end and what they pass."""
+"""Kernels of readings of sonars: where they end and what they pass."""
 
 import math
 
@@ -32,14 +32,22 @@ def count_ends(
 def clear_rays(
     starts: FloatArray, ends: FloatArray, occupied: NDArray[np.bool_], cleared: NDArray[np.bool_]
 ) -> None:
-    """Mark the cells of rays up to the first occupied one, or to the border; points (k, 2) in cells."""
+    """Mark the cells of rays up to the first occupied one, or to the border; points (k, 2) in cells.
+
+    Two occupied cells that touch at a corner hold a ray as well, which would slip through between them.
+    """
     rows, columns = occupied.shape
     for k in range(starts.shape[0]):
         x, y = starts[k, 0], starts[k, 1]
         dx, dy = ends[k, 0] - x, ends[k, 1] - y
         steps = math.ceil(2.0 * math.hypot(dx, dy)) + 1
+        before_row, before_column = math.floor(y), math.floor(x)
         for s in range(steps):
             row, column = math.floor(y + dy * s / steps), math.floor(x + dx * s / steps)
             if not (0 <= row < rows and 0 <= column < columns) or occupied[row, column]:
                 break
+            # on a straight step one of these two is free: the cell before, or this one
+            if occupied[before_row, column] and occupied[row, before_column]:
+                break
+            before_row, before_column = row, column
             cleared[row, column] = True

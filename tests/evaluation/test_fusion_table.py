@@ -117,4 +117,7 @@ def test_on_the_real_hallway_ours_is_nearest_to_the_truth(tool, real, way):
     for other in (tool.LIDAR, tool.CLEARED, tool.RSF_ALL, f"{tool.RSF_ALL}, 2 sonars"):
         assert ours.mean > rows[other].mean
         assert ours.saved_mean > rows[other].saved_mean + 0.03
-    assert rows[f"{tool.OURS}, 2 sonars"].mean > 0.98 * ours.mean
+    sides = [rows[f"{name}, 2 sonars"].mean for name in (tool.OURS, tool.RSF_ALL)]
+    assert sides[0] > sides[1] + 0.03
+    # where many beams make a cell free, sonars that look ahead pave the middle of the way
+    assert sides[0] > (0.93 if way == "drawn as in pi-map" else 0.98) * ours.mean

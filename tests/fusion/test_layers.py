@@ -1,5 +1,6 @@
 """Decision layers, by hand-computed examples."""
 
+import itertools
 import math
 
 import numpy as np
@@ -139,9 +140,21 @@ def test_rays_clear_up_to_the_first_wall_as_by_the_naive_twin(seed):
     naive = np.zeros(occupied.shape, bool)
     for (x0, y0), (x1, y1) in zip(starts, ends, strict=True):
         steps = math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0)) + 1
-        for s in range(steps):
-            row, column = math.floor(y0 + (y1 - y0) * s / steps), math.floor(x0 + (x1 - x0) * s / steps)
+        line = [(y0 + (y1 - y0) * s / steps, x0 + (x1 - x0) * s / steps) for s in range(steps)]
+        cells = [(math.floor(y), math.floor(x)) for y, x in line]
+        for (r, c), (row, column) in itertools.pairwise([cells[0], *cells]):
             if not (0 <= row < 12 and 0 <= column < 15) or occupied[row, column]:
+                break
+            if occupied[r, column] and occupied[row, c]:
                 break
             naive[row, column] = True
     assert cleared.tolist() == naive.tolist()
+
+
+@pytest.mark.parametrize(("wall", "is_held"), [("#+++ +#++ ++#+ +++#", True), ("#+++ ++++ ++#+ +++#", False)])
+def test_rays_do_not_slip_through_walls_that_run_aslant(wall, is_held):
+    occupied = np.array([[cell == "#" for cell in row] for row in wall.split()])[::-1]
+    cleared = np.zeros((4, 4), np.bool_)
+    clear_rays(np.array([[0.5, 0.6]]), np.array([[2.6, 2.7]]), occupied, cleared)
+    assert cleared[1, 1]
+    assert cleared[2, 2] != is_held
