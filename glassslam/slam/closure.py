@@ -9,23 +9,18 @@ from glassslam.config import LoopClosureConfig
 from glassslam.geometry import between, compose, inverse
 from glassslam.grid.probability_grid import ProbabilityGrid
 from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
-from glassslam.matching.gradient import MatchResult, match_scan
+from glassslam.matching.gradient import MatchResult
 from glassslam.matching.profile_kernels import flat_reach
 from glassslam.records import FloatArray
-from glassslam.slam.hold_kernels import known_share
 from glassslam.slam.neighbourhood import Neighbourhood
+from glassslam.slam.wide_search import WidePlace, find_wide_place, refined
 
 _DIRECT_LINEAR, _DIRECT_ANGULAR = 0.25, 0.1
-_WEAK_WEIGHT = 0.03
 _INFORMATION_SCALE = 100.0
 _PROFILE_REACH, _PROFILE_STEP, _PROFILE_MARGIN = 8.0, 0.2, 0.06
 _AMBIGUOUS_REACH = 0.5
 _AMBIGUOUS_SIGMA = 20.0
 _LEAST_POINTS = 50
-_CLEARLY_BETTER = 0.03
-_LEAST_KNOWN = 0.5
-_WIDE_RESIDUAL, _UNKNOWN_RESIDUAL = 0.46, 0.49
-_EXPECTED_DISTANCE, _EXPECTED_TURN = 1.0, 0.3
 _ROUNDING = 1e-9
 
 
@@ -66,7 +61,8 @@ class Closure:
     candidate : Candidate
         The search.
     rejected : str
-        Empty, or the reason: "few points", "low score", "poor fit", "inconsistent", "ambiguous".
+        Empty, or the reason: "few points", "low score", "poor fit", "inconsistent", "ambiguous",
+        "unconfirmed".
     anchor_from_node : ndarray of float64, shape (3,)
         Measured pose of the node in the frame of the anchor.
     covariance : ndarray of float64, shape (3, 3)
@@ -117,16 +113,22 @@ def close(
 
     if len(scene.fine) < _LEAST_POINTS:
         return refuse("few points")
-    match = _located(candidate, scene, grid, matcher, config)
+    if is_wide(candidate, config) and matcher is not None:
+        place = _wide_place(candidate, scene, grid, matcher, config)
+        match, objection = (None, "") if place is None else (place.match, place.objection)
+    else:
+        match, objection = _located(candidate, scene, grid, matcher, config), ""
     if match is None:
         return refuse("low score")
-    if match.residual > min(_worst_residual(candidate, scene, match.pose, config), config.max_residual):
-        return refuse("poor fit")
+    if objection or match.residual > min(max(0.45, 1.1 * scene.residual + 0.03), config.max_residual):
+        return refuse(objection or "poor fit")
     measured = between(candidate.anchor_in_local, match.pose)
     covariance, ambiguous = _uncertainty(match, scene, grid, candidate.anchor_in_local, config)
-    objection = _objection(candidate, scene, grid, match.pose, measured, covariance, config, chi_square_limit)
-    if ambiguous and is_wide(candidate, config) and not _is_expected(candidate, match.pose):
-        objection = "ambiguous"
+    if is_wide(candidate, config):
+        # no covariance of first order holds so far off: other closures are asked instead of the graph
+        objection = "ambiguous" if ambiguous else ""
+    elif _is_contradicted(candidate, measured, covariance, chi_square_limit):
+        objection = "inconsistent"
     if objection:
         return refuse(objection)
     return Closure(candidate, "", measured, covariance, ambiguous, searched)
@@ -142,6 +144,19 @@ def needs_search(linear_window: float, angular_window: float) -> bool:
     return linear_window > _DIRECT_LINEAR or angular_window > _DIRECT_ANGULAR
 
 
+def _wide_place(
+    candidate: Candidate,
+    scene: Neighbourhood,
+    grid: ProbabilityGrid,
+    matcher: BranchAndBoundMatcher,
+    config: LoopClosureConfig,
+) -> WidePlace | None:
+    guess = compose(candidate.anchor_in_local, candidate.anchor_from_node)
+    # no window reaches all the places the graph allows: look where the submap was seen from
+    center = np.array([*candidate.anchor_in_local[:2], guess[2]])
+    return find_wide_place(scene, grid, matcher, center, guess, candidate.linear_window, config)
+
+
 def _located(
     candidate: Candidate,
     scene: Neighbourhood,
@@ -149,75 +164,22 @@ def _located(
     matcher: BranchAndBoundMatcher | None,
     config: LoopClosureConfig,
 ) -> MatchResult | None:
-    """Where the scene fits best in the window; None when nowhere.
-
-    A search all around finds as good a place in every corridor that looks alike: the expected place counts
-    as well, and is left only for a clearly better one.
-    """
+    """Where the scene fits best in the window; None when nowhere."""
     guess = compose(candidate.anchor_in_local, candidate.anchor_from_node)
     if matcher is None:
-        return _refined(scene, grid, guess)
-    center = guess
-    if is_wide(candidate, config):
-        # no window reaches all the places the graph allows: look where the submap was seen from
-        center = np.array([*candidate.anchor_in_local[:2], guess[2]])
+        return refined(scene, grid, guess)
     found = matcher.match(
-        scene.coarse, center, candidate.linear_window, candidate.angular_window, config.min_score
+        scene.coarse, guess, candidate.linear_window, candidate.angular_window, config.min_score
     )
-    searched = None if found is None else _refined(scene, grid, found.pose)
-    if not is_wide(candidate, config):
-        return searched
-    near = _refined(scene, grid, guess)
-    if searched is None:
-        return near
-    return searched if searched.residual < near.residual - _CLEARLY_BETTER else near
+    return None if found is None else refined(scene, grid, found.pose)
 
 
-def _worst_residual(
-    candidate: Candidate, scene: Neighbourhood, pose: FloatArray, config: LoopClosureConfig
-) -> float:
-    """Residual up to which a place is believed; after a wide search, better than that of unknown ground."""
-    usual = max(0.45, 1.1 * scene.residual + 0.03)
-    if not is_wide(candidate, config):
-        return usual
-    return min(usual, _UNKNOWN_RESIDUAL) if _is_expected(candidate, pose) else _WIDE_RESIDUAL
-
-
-def _is_expected(candidate: Candidate, pose: FloatArray) -> bool:
-    """Whether a pose in the local frame is about where the graph has it."""
-    off = between(compose(candidate.anchor_in_local, candidate.anchor_from_node), pose)
-    return bool(math.hypot(off[0], off[1]) < _EXPECTED_DISTANCE and abs(off[2]) < _EXPECTED_TURN)
-
-
-def _objection(
-    candidate: Candidate,
-    scene: Neighbourhood,
-    grid: ProbabilityGrid,
-    pose: FloatArray,
-    measured: FloatArray,
-    covariance: FloatArray,
-    config: LoopClosureConfig,
-    chi_square_limit: float,
-) -> str:
-    """Why a place that fits is not believed; empty where it is."""
-    if is_wide(candidate, config):
-        # no covariance of first order holds so far off: other closures are asked instead of the graph
-        known = known_share(grid.cells, grid.origin, 1.0 / grid.resolution, scene.fine, pose)
-        return "poor fit" if known < _LEAST_KNOWN else ""
+def _is_contradicted(
+    candidate: Candidate, measured: FloatArray, covariance: FloatArray, chi_square_limit: float
+) -> bool:
+    """Whether a place is farther from where the graph has it than their covariances allow."""
     error = compose(inverse(candidate.anchor_from_node), measured)
-    distance = error @ np.linalg.solve(candidate.covariance + covariance, error)
-    return "inconsistent" if distance > chi_square_limit else ""
-
-
-def _refined(scene: Neighbourhood, grid: ProbabilityGrid, guess: FloatArray) -> MatchResult:
-    return match_scan(
-        grid,
-        scene.fine,
-        guess,
-        translation_weight=_WEAK_WEIGHT,
-        rotation_weight=_WEAK_WEIGHT,
-        max_iterations=30,
-    )
+    return bool(error @ np.linalg.solve(candidate.covariance + covariance, error) > chi_square_limit)
 
 
 def _uncertainty(

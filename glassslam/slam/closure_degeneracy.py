@@ -55,7 +55,7 @@ def break_degeneracies(trace: Trace) -> Iterator[Degeneracy]:
         elif labels[stretch] < stretch:
             yield trace.told(kind, scan - 1, scan, f"{what}: split, and {_rejoined(trace, stretch, scan)}")
         else:
-            text = f"{what}: split, and not rejoined: where the map goes on from there is a guess"
+            text = f"{what}: split, and not rejoined: {_loose(trace, stretch, scan)}"
             yield trace.told(f"{kind}, not rejoined", scan - 1, scan, text)
 
 
@@ -125,6 +125,13 @@ def _rejoined(trace: Trace, stretch: int, scan: int) -> str:
     step = between(trace.final[scan - 1], trace.final[scan])
     moved, turned = math.hypot(step[0], step[1]), math.degrees(abs(step[2]))
     return f"rejoined by {_closures(crossing)}, {moved:.2f} m and {turned:.0f} deg on"
+
+
+def _loose(trace: Trace, stretch: int, scan: int) -> str:
+    nexts = [int(trace.node_scans[begin]) for begin in trace.begins[stretch:]]
+    last = (nexts[0] if nexts else len(trace.stamps)) - 1
+    length = trace.travelled[last] - trace.travelled[scan]
+    return f"scans {scan} to {last} ({length:.1f} m) hang loose, their place in the map is a guess"
 
 
 def _closures(count: int) -> str:

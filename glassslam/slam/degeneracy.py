@@ -29,7 +29,8 @@ _SUMMARIES = (
     ),
     (
         ("clock jump, not rejoined", "silence, not rejoined"),
-        "the recording breaks off {times}, and how what follows lies to what was before is a guess",
+        "the recording breaks off {times}, and the map is in pieces that may be drawn over each other:"
+        " how they lie is a guess",
     ),
     (("closure rejected",), "{where} passed places known from before without recognising them"),
 )

@@ -20,7 +20,7 @@ from glassslam.slam.closure import Candidate, Closure
 from glassslam.slam.journal import Journal, NoJournal
 from glassslam.slam.loop_closing import LoopSearcher, select
 from glassslam.slam.node import Node
-from glassslam.slam.rejoin import WEAK_STEP, move_stretches
+from glassslam.slam.rejoin import WEAK_STEP, Rejoining, move_stretches
 from glassslam.slam.search_outcome import SearchOutcome
 from glassslam.slam.stopwatch import Stages
 
@@ -66,6 +66,7 @@ class GlobalSlam:
         self._searched = 0
         self._hurried = threading.Event()
         self._searcher = LoopSearcher(config.loop_closure, self._hurried.is_set)
+        self._rejoining = Rejoining(config.loop_closure)
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="loop-closing")
         self._pending: Future[list[Closure]] | list[Closure] | None = None
         noise = config.optimization
@@ -108,6 +109,8 @@ class GlobalSlam:
         """Make the last searches, optimise, and take out the closures that do not fit."""
         self._round(len(self.nodes))
         self._collect()
+        self._enter(self._rejoining.settle([], self.graph, self.nodes, np.array(self._travel), self.submaps))
+        self._enter(self._rejoining.give_up())
         limits = self._config.optimization
         with self._stages.measure("optimisation"), self._keeping_poses():
             prune_closures(
@@ -207,6 +210,12 @@ class GlobalSlam:
         closures = self._pending if isinstance(self._pending, list) else self._found(self._pending)
         self._pending = None
         self.searches += len(closures)
+        self._enter(
+            self._rejoining.settle(closures, self.graph, self.nodes, np.array(self._travel), self.submaps)
+        )
+
+    def _enter(self, closures: Sequence[Closure]) -> None:
+        """Note what became of searches, enter the closures found and optimise."""
         self.outcomes += [SearchOutcome.of(closure) for closure in closures]
         self.rejected.update(closure.rejected for closure in closures if closure.rejected)
         weighed = [(closure, _root(closure.covariance)) for closure in closures if not closure.rejected]

@@ -16,7 +16,7 @@ from glassslam.records import FloatArray
 from glassslam.slam.closure import Candidate, Closure, close, is_wide, needs_search
 from glassslam.slam.neighbourhood import neighbourhood, neighbours
 from glassslam.slam.node import Node
-from glassslam.slam.rejoin import agreeing, beginnings
+from glassslam.slam.rejoin import beginnings
 
 _NEAR = 4.0
 _FARTHEST_CANDIDATE = 25.0
@@ -140,11 +140,10 @@ class LoopSearcher:
         submaps: Sequence[Submap],
     ) -> list[Closure]:
         """Results of all candidates, in their order; of the first ones where it is told to hurry."""
-        closures = [
+        return [
             self._close(candidate, nodes, travel, submaps)
             for candidate in takewhile(lambda _: not self._is_hurried(), candidates)
         ]
-        return agreeing(closures, nodes, self._config)
 
     def _close(
         self, candidate: Candidate, nodes: list[Node], travel: FloatArray, submaps: Sequence[Submap]

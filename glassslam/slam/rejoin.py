@@ -2,29 +2,28 @@
 
 Where the clock is set, or the recording is silent for long, the robot may have been carried anywhere. A new
 stretch begins there, held to the one before by a weak step only (cf. the new trajectory that Cartographer
-starts); searches across it look all around. Such a wide search finds false places more easily than one that
-the graph narrows down, so what it finds is believed only as far as several searches agree.
+starts); searches across it look all around. What they find waits until enough of it agrees and the maps of
+both sides bear it out: a run left in two pieces is told, a wrong join could not be.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.config import LoopClosureConfig
-from glassslam.geometry import between, compose
+from glassslam.geometry import compose, inverse
+from glassslam.grid.submap import Submap
 from glassslam.posegraph import PoseGraph
 from glassslam.posegraph.storage import LOOP
 from glassslam.records import FloatArray
 from glassslam.slam.closure import Closure, is_wide
 from glassslam.slam.node import Node
+from glassslam.slam.rejoin_votes import Run, Votes, is_proven, strongest
 
 WEAK_STEP = (3.0, 3.0, 1.05)
 """Standard deviation of the step over a break, m, m and rad: three times that is any direction."""
-_SAME_PLACE, _SAME_HEADING = 1.0, 0.15
-_FEW_SEARCHES, _LEAST_VOTES = 8, 3
 
 
 def beginnings(nodes: Sequence[Node]) -> list[int]:
@@ -32,59 +31,99 @@ def beginnings(nodes: Sequence[Node]) -> list[int]:
     return [node.index for node in nodes if node.begins]
 
 
-def agreeing(closures: Sequence[Closure], nodes: Sequence[Node], config: LoopClosureConfig) -> list[Closure]:
-    """The closures, of which wide ones that contradict the others are rejected as "inconsistent".
+class Rejoining:
+    """Wide closures that wait until others confirm them.
 
-    Every wide closure tells where the stretch of its node begins, seen from the stretch of its anchor. Those
-    that agree with most others stay; where all contradict each other, none does, and a lone find stays only
-    where few searches were made: chance finds one place in many.
+    A wide closure tells how all that is joined with its node lies to all that is joined with its anchor. It
+    is believed when three or more agree, of more than one node; when fewer than half as many say otherwise;
+    and when each side, laid upon the other for 15 m of travel around the places found, has few walls in the
+    free space of the other, over 3 m or more of travel on ground that is known.
 
     Parameters
     ----------
-    closures : sequence of Closure
-        What one round of searches found.
-    nodes : sequence of Node
-        All nodes.
     config : LoopClosureConfig
         Windows of searches within a stretch.
+
+    Attributes
+    ----------
+    waiting : list of Closure
+        Wide closures not decided on.
     """
-    out = list(closures)
-    begins = np.array([0, *beginnings(nodes)])
 
-    def stretches(k: int) -> tuple[int, int]:
-        ends = closures[k].candidate.node, closures[k].candidate.anchor
-        node, anchor = np.searchsorted(begins, ends, side="right") - 1
-        return int(node), int(anchor)
+    def __init__(self, config: LoopClosureConfig) -> None:
+        self._config = config
+        self.waiting: list[Closure] = []
 
-    wide = [k for k, c in enumerate(closures) if is_wide(c.candidate, config)]
-    for (stretch, _), group in groupby(sorted(wide, key=stretches), stretches):
-        tried = list(group)
-        found = [k for k in tried if not closures[k].rejected]
-        start = nodes[begins[stretch]].pose_in_local
-        places = np.array([_begin_seen_by(closures[k], nodes, start) for k in found]).reshape(-1, 3)
-        least = 1 if len(tried) <= _FEW_SEARCHES else _LEAST_VOTES
-        for k, stays in zip(found, _majority(places, least), strict=True):
-            if not stays:
-                out[k] = replace(closures[k], rejected="inconsistent")
-    return out
+    def settle(
+        self,
+        closures: Sequence[Closure],
+        graph: PoseGraph,
+        nodes: Sequence[Node],
+        travel: FloatArray,
+        submaps: Sequence[Submap],
+    ) -> list[Closure]:
+        """Closures that are decided on: narrow ones as they are, wide ones believed or "inconsistent".
+
+        Parameters
+        ----------
+        closures : sequence of Closure
+            What one round of searches found.
+        graph : PoseGraph
+            Vertex i is node i.
+        nodes : sequence of Node
+            All nodes.
+        travel : ndarray of float64, shape (n,)
+            Distance travelled up to every node, m.
+        submaps : sequence of Submap
+            Finished submaps.
+        """
+        decided: list[Closure] = []
+        for closure in closures:
+            waits = is_wide(closure.candidate, self._config) and not closure.rejected
+            (self.waiting if waits else decided).append(closure)
+        return [*decided, *self._weighed(graph, nodes, travel, submaps)] if self.waiting else decided
+
+    def give_up(self) -> list[Closure]:
+        """All that still waits, rejected as "unconfirmed"."""
+        waiting, self.waiting = self.waiting, []
+        return [replace(closure, rejected="unconfirmed") for closure in waiting]
+
+    def _weighed(
+        self, graph: PoseGraph, nodes: Sequence[Node], travel: FloatArray, submaps: Sequence[Submap]
+    ) -> list[Closure]:
+        begins, edges = beginnings(nodes), graph.edges
+        labels = joined(begins, edges.ends[(edges.kinds == LOOP) & edges.enabled])
+        parts = labels[np.searchsorted(begins, np.arange(len(nodes)), side="right")]
+        run = Run(nodes, graph.poses, travel, submaps, parts)
+        by_pair: dict[tuple[int, int], list[Closure]] = {}
+        for closure in self.waiting:
+            ends = int(parts[closure.candidate.node]), int(parts[closure.candidate.anchor])
+            by_pair.setdefault((min(ends), max(ends)), []).append(closure)
+        self.waiting = []
+        decided: list[Closure] = []
+        changed: set[int] = set()
+        for (low, high), closures in sorted(by_pair.items()):
+            believed = None
+            if low == high:
+                believed = Votes.of(closures, run).fits(run.poses)
+            elif not {low, high} & changed:
+                believed = _believed(closures, run)
+            if believed is None:
+                self.waiting += closures
+                continue
+            changed |= {low, high} if low != high else set()
+            decided += [
+                closure if stays else replace(closure, rejected="inconsistent")
+                for closure, stays in zip(closures, believed, strict=True)
+            ]
+        return decided
 
 
-def _begin_seen_by(closure: Closure, nodes: Sequence[Node], start: FloatArray) -> FloatArray:
-    """Where a closure puts the first node of a stretch, in the local frame of the anchor."""
-    candidate = closure.candidate
-    node = compose(candidate.anchor_in_local, closure.anchor_from_node)
-    return compose(node, between(nodes[candidate.node].pose_in_local, start))
-
-
-def _majority(poses: FloatArray, least: int) -> NDArray[np.bool_]:
-    """Which poses (k, 3) belong to the largest group around one of them, if it has `least` members."""
-    if len(poses) == 0:
-        return np.zeros(0, dtype=np.bool_)
-    gap = between(poses[:, None], poses[None])
-    near = (np.hypot(gap[..., 0], gap[..., 1]) < _SAME_PLACE) & (np.abs(gap[..., 2]) < _SAME_HEADING)
-    votes = near.sum(axis=1)
-    is_enough = votes.max() >= (least if len(poses) == 1 else max(least, 2))
-    return np.asarray(near[votes.argmax()] & is_enough)
+def _believed(closures: Sequence[Closure], run: Run) -> NDArray[np.bool_] | None:
+    """Which closures between two parts are right; None as long as too little is known."""
+    votes = Votes.of(closures, run)
+    best, group = strongest(votes, run)
+    return group if is_proven(votes, best, group, run) else None
 
 
 def joined(begins: Sequence[int], ends: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -127,8 +166,7 @@ def move_stretches(
     config : LoopClosureConfig
         Windows of searches within a stretch.
     """
-    begins = beginnings(nodes)
-    edges = graph.edges
+    begins, edges = beginnings(nodes), graph.edges
     ends = edges.ends[(edges.kinds == LOOP) & edges.enabled]
     for closure in closures:
         if not is_wide(closure.candidate, config):
@@ -139,9 +177,11 @@ def move_stretches(
         if mine == other:
             continue
         poses = graph.poses
-        goal = compose(poses[anchor], closure.anchor_from_node)
+        moved = compose(compose(poses[anchor], closure.anchor_from_node), inverse(poses[node]))
+        if mine < other:
+            # what holds the beginning of the run stays
+            mine, moved = other, inverse(moved)
         bounds = [0, *begins, len(poses)]
         for k in np.flatnonzero(labels == mine):
-            part = slice(bounds[k], bounds[k + 1])
-            graph.set_poses(bounds[k], compose(goal, between(poses[node], poses[part])))
+            graph.set_poses(bounds[k], compose(moved, poses[bounds[k] : bounds[k + 1]]))
         ends = np.vstack((ends, [[anchor, node]]))

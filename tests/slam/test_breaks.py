@@ -94,8 +94,14 @@ def test_a_place_never_seen_before_is_not_joined_and_told():
     later = recording(CORRIDOR, second, start=400.0)
     result = mapped([*records, *later])
     assert "silence, not rejoined" in kinds(result)
-    assert "where the map goes on from there is a guess" in told(result, "silence, not rejoined").text
-    assert any("is a guess: see report" in warning for warning in result.statistics.warnings)
+    text = told(result, "silence, not rejoined").text
+    loose = f"split, and not rejoined: scans {len(first)} to {len(first) + len(second) - 1} ("
+    assert loose in text
+    assert "m) hang loose, their place in the map is a guess" in text
+    assert any(
+        "breaks off once, and the map is in pieces that may be drawn over each other" in warning
+        for warning in result.statistics.warnings
+    )
     assert np.isfinite(result.trajectory.poses).all()
 
 

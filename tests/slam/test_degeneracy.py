@@ -157,8 +157,14 @@ class TestBreaks:
         (one,) = find_degeneracies(self.broken(40.0, Event.GAP, used=[[3, 4], [60, 70]]))
         assert one.kind == "silence, not rejoined"
         assert one.text == (
-            "no scan for 40.1 s: split, and not rejoined: where the map goes on from there is a guess"
+            "no scan for 40.1 s: split, and not rejoined: scans 100 to 199 (9.9 m) hang loose,"
+            " their place in the map is a guess"
         )
+
+    def test_a_loose_stretch_ends_at_the_next_break(self):
+        trace = replace(self.broken(40.0, Event.GAP), begins=[50, 80])
+        (one,) = find_degeneracies(trace)
+        assert "scans 100 to 159 (5.9 m) hang loose" in one.text
 
     def test_a_silence_bridged_by_odometry(self):
         (one,) = find_degeneracies(self.broken(9.0 * 3600, Event.NONE, splits=False))
