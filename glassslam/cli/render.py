@@ -1,7 +1,8 @@
 """`glassslam render`: draw the results of a run again, without SLAM."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from glassslam.cli.run import Manner, conclude, explained_end, go_on_with
 from glassslam.cli.workplace import check_room, made_directory, named_target, session_path
-from glassslam.errors import GlassSlamError, InterruptedRunError, OutputError, UsageError
+from glassslam.errors import GlassSlamError, InterruptedRunError, OutputError, SessionError, UsageError
 
 if TYPE_CHECKING:
     from glassslam.config import Config
@@ -102,17 +103,32 @@ def _render(
             check_room(folder, target, overwrite=False)
             with made_directory(folder):
                 Session.copy(source, folder / SESSION_FILE)
-        with explained_end(target), Session.open(folder / SESSION_FILE) as session:
-            try:
-                finished = _changed(session, change(session.config), target, manner)
-                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
-            except (OutputError, InterruptedRunError):
-                raise
-            except GlassSlamError:  # the session it was made from is where it was
-                if source.parent != folder:
-                    session.abandon()
-                    shutil.rmtree(folder)
-                raise
+        with (
+            explained_end(target),
+            _given_up_where_it_fails(source, folder),
+            Session.open(folder / SESSION_FILE) as session,
+        ):
+            finished = _changed(session, change(session.config), target, manner)
+            return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+
+
+@contextmanager
+def _given_up_where_it_fails(source: Path, folder: Path) -> Iterator[None]:
+    """Remove the copy of a session with which nothing can be done; the session itself is where it was."""
+    try:
+        yield
+    except (OutputError, InterruptedRunError):
+        raise
+    except GlassSlamError as error:
+        if source.parent == folder:
+            raise
+        shutil.rmtree(folder)
+        if isinstance(error, SessionError):
+            message = error.message.replace(str(folder), str(source.parent))
+            name = folder.name.removesuffix(".partial")
+            hint = error.hint.replace(f"recover {name}", f"recover {source.parent.name}")
+            raise SessionError(message, hint) from error
+        raise
 
 
 def _changed(session: "Session", config: "Config", target: Path, manner: Manner) -> "FinishedRun":

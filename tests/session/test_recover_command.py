@@ -124,6 +124,18 @@ def test_a_number_that_was_changed_is_noticed(finished):
     assert saved.scans_beyond > 100
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_is_drawn_from_a_damaged_session(finished, capsys, seed):
+    turn_bytes(finished, 20, seed)
+    damaged = finished.read_bytes()
+    assert main(["render", str(finished.parent), "-o", str(finished.parent.with_name("other"))]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {finished} is damaged: ")
+    assert error.endswith("(save what there is: glassslam recover run)\n")
+    assert finished.read_bytes() == damaged
+    assert [path.name for path in finished.parent.parent.iterdir()] == ["run"]
+
+
 def test_without_its_recording_nothing_can_be_saved(finished, capsys):
     with sqlite3.connect(finished) as database:
         database.execute("UPDATE facts SET value = '[]' WHERE name = 'recordings'")
