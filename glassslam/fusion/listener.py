@@ -15,7 +15,7 @@ from glassslam.fusion.revisit_kernels import revisit
 from glassslam.glass.beams import BeamEvidence
 from glassslam.glass.layer import wall_cells
 from glassslam.glass.observations import GlassObservations
-from glassslam.records import Float32Array, RangeRing, SonarRing
+from glassslam.records import Float32Array, FloatArray, RangeRing, SonarRing
 from glassslam.slam.result import MapResult, OccupancyMap, SonarMaps
 from glassslam.slam.trajectory import PoseTracks
 from glassslam.sonar.glass import sonar_glass_observations
@@ -26,6 +26,7 @@ from glassslam.sonar.sweeps import SonarSweeps, placed_sweeps
 _OCCUPIED = 0.65
 _LIDAR, _SONAR, _BOTH = 1, 2, 3
 _ROUNDING = 1e-3
+_SIGHTS = 72
 
 
 class SonarListener:
@@ -105,7 +106,7 @@ def by_walls(result: MapResult, sweeps: SonarSweeps, config: SonarConfig) -> Fus
 
     Every sensor gives oriented pieces of surface with its own uncertainty; walls are fitted to all of them
     together, and the beams of the lidar decide how far they reach. The map is that of the lidar, with its
-    beams ending at the walls. What it has seen and not decided is free on the axes of sonars up to what is
+    beams ending at the walls. What it has seen and not decided is free in sight of the path, up to what is
     occupied; where no beam came, it is free up to where a sonar heard something. One return with nothing
     beside it is no obstacle, but noise or a mirror image.
 
@@ -121,7 +122,7 @@ def by_walls(result: MapResult, sweeps: SonarSweeps, config: SonarConfig) -> Fus
     closed = _without_lone_returns(result.closed_map or result.map, result.config.map.hit_probability)
     unknown = np.isnan(closed.probability)
     added = unknown & _cleared(closed, sweeps, config)
-    probability = np.where(added, np.float32(FREE), _in_sight(closed, sweeps))
+    probability = np.where(added, np.float32(FREE), _in_sight(closed, result.tracks.nodes.poses))
     source = np.where(unknown, 0, _LIDAR).astype(np.uint8)
     source[added] = _SONAR
     _mark_walls(source, result, (source.shape[0], source.shape[1]), closed)
@@ -138,15 +139,17 @@ def _without_lone_returns(grid: OccupancyMap, hit_probability: float) -> Occupan
     return replace(grid, probability=np.where(lone, np.float32(np.nan), grid.probability))
 
 
-def _in_sight(grid: OccupancyMap, sweeps: SonarSweeps) -> Float32Array:
-    """P(occupied) with the cells made free that the lidar has seen, and that the axes of sonars reach.
+def _in_sight(grid: OccupancyMap, poses: FloatArray) -> Float32Array:
+    """P(occupied) with the cells made free that the lidar has seen, and that lie in sight of the path.
 
-    Axes end at what is occupied, however far away; those that nothing stops tell nothing. Where the odds of
-    the map need many beams, much of a room is seen and not decided.
+    Lines of sight go all around from poses (n, 3) and end at what is occupied, however far away; those that
+    nothing stops tell nothing. Where the odds of the map need many beams, much of a room is seen and not
+    decided.
     """
     occupied = grid.probability > _OCCUPIED
-    rays = sweeps.sensors.reshape(-1, 3).copy()
+    rays = np.repeat(poses, _SIGHTS, axis=0)
     rays[:, :2] = (rays[:, :2] - np.asarray(grid.origin)) / grid.resolution
+    rays[:, 2] += np.tile(np.arange(_SIGHTS) * (2.0 * np.pi / _SIGHTS), len(poses))
     path = np.empty((sum(occupied.shape), 2), dtype=np.int64)
     paved, source = grid.probability.copy(), np.zeros(occupied.shape, dtype=np.uint8)
     revisit(rays, occupied, occupied, math.inf, True, FREE, _OCCUPIED, path, paved, source)
