@@ -107,10 +107,17 @@ def _check_parent(directory: str | Path, target: Path) -> None:
     if not parent.is_dir():
         raise OutputError(f"cannot write {directory}: {parent} is a file")
     # Trying is surer than asking: permissions say nothing of read-only disks, and all is allowed to root.
+    # The name is known before the folder is made, so that a signal in between leaves nothing behind.
+    trial = parent / f".{target.name}.{os.getpid()}"
     try:
-        tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=parent).cleanup()
+        trial.mkdir()
+    except FileExistsError:
+        pass
     except OSError as error:
         raise _unwritable(directory, error) from error
+    finally:
+        with suppress(OSError):
+            trial.rmdir()
 
 
 @contextmanager
