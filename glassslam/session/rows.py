@@ -3,7 +3,8 @@
 import math
 import struct
 from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,13 @@ from glassslam.slam.tracking import Event, How, Match, Tracking
 
 Row = Sequence[Any]
 
+_carried_on = attrgetter(*(field.name for field in fields(Tracking)))
 _DOUBLE = struct.Struct("<d")
 
 
 def scan_row(number: int, stamp: float, outcome: ScanOutcome) -> tuple[Any, ...]:
     """Row of `scans`."""
-    match, (usual, *counts) = outcome.match, astuple(outcome.tracking)
+    match, (usual, *counts) = outcome.match, _carried_on(outcome.tracking)
     return (
         number, *map(_kept, (stamp, *match.pose, match.residual)), int(match.points),
         *map(_kept, (match.hold, match.free_heading, match.overlap)), int(match.how), int(match.event),

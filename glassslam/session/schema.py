@@ -94,10 +94,11 @@ def unsealed(row: Sequence[Any]) -> tuple[Any, ...]:
 
 
 def seal(row: Sequence[Any]) -> int:
-    """Checksum of a row."""
-    mark = 0
+    """Checksum of a row: of its numbers and texts as Python writes them, then of its bytes."""
+    mark = zlib.crc32(repr([value for value in row if not isinstance(value, bytes)]).encode())
     for value in row:
-        mark = zlib.crc32(value if isinstance(value, bytes) else repr(value).encode(), mark)
+        if isinstance(value, bytes):
+            mark = zlib.crc32(value, mark)
     return mark
 
 
