@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from session_worlds import WORDS, assert_same_results, results, rows_of, snapshot, write_ring
+from session_worlds import WORDS, assert_same_results, rows_of, snapshot
 
 from glassslam.cli import main
 from glassslam.session import Session, session
@@ -44,19 +44,6 @@ class _Copying(SessionJournal):
 
     def _take(self):
         self._killed.take(self._path.parent, (self.scans, self._rounds, self._searches))
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    return write_ring(tmp_path_factory.mktemp("ring") / "ring.bag")
-
-
-@pytest.fixture(scope="module")
-def whole(bag, tmp_path_factory):
-    """The results of a run that nothing stops."""
-    folder = tmp_path_factory.mktemp("whole") / "run"
-    assert main(["map", str(bag), "-o", str(folder), *WORDS]) == 0
-    return results(folder)
 
 
 @pytest.fixture(scope="module")

@@ -14,28 +14,14 @@ from session_worlds import (
     assert_same_results,
     ended,
     interrupted,
-    results,
     ringing_after,
     start,
-    write_ring,
 )
 
 from glassslam.cli import main
 from glassslam.outputs import RESULT_FILES
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.sources.recording import Recording
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    return write_ring(tmp_path_factory.mktemp("ring") / "ring.bag")
-
-
-@pytest.fixture(scope="module")
-def whole(bag, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("whole") / "run"
-    assert main(["map", str(bag), "-o", str(folder), *WORDS]) == 0
-    return results(folder)
 
 
 @pytest.fixture
