@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -27,14 +28,26 @@ def locked(directory: str | Path) -> Iterator[None]:
         Another run is writing there.
     """
     path = _lock_path(Path(directory).resolve())
-    descriptor = _acquire(path, directory)
+    descriptor = None
     try:
+        with _undisturbed():
+            descriptor = _acquire(path, directory)
         yield
     finally:
         if descriptor is not None:
             with suppress(OSError):
                 path.unlink()
             os.close(descriptor)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Keep signals waiting: one that came between making the lock and knowing of it would leave it behind."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _lock_path(target: Path) -> Path:
