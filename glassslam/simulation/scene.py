@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from glassslam.cards import datasets_folder
 from glassslam.errors import ConfigError
-from glassslam.simulation.materials import MATERIALS, Finite, Material, NonNegative, Part, Positive
+from glassslam.simulation.materials import MATERIALS, Finite, Material, NonNegative, Part, Positive, Rate
 from glassslam.yamlmodel import load_yaml_model
 
 Coordinate = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
@@ -159,7 +159,7 @@ class OdometryModel(Part):
     The random terms are standard deviations after one unit of motion and grow with its square root.
     """
 
-    rate: Positive = 50.0
+    rate: Rate = 50.0
     """Messages per second."""
     distance_scale: Positive = 1.004
     """Measured over true distance (wheel diameter)."""
@@ -182,7 +182,7 @@ class UltrasonicMount(Part):
     """Pose on the robot base: x m, y m, yaw rad; it hears around its x axis."""
     height: Positive = 0.4
     """Height above the floor, m."""
-    rate: Positive = 20.0
+    rate: Rate = 20.0
     """Pings per second."""
 
 
@@ -203,7 +203,7 @@ class Scene(Part):
     """Height of the ceiling, m; it is only heard."""
     ultrasonic: UltrasonicMount | None = None
     """A 3D ultrasonic sensor carried as well."""
-    scan_rate: Positive | None = None
+    scan_rate: Rate | None = None
     """Scans recorded per second, at most those of the lidar; all when omitted."""
     start_time: Annotated[float, Field(ge=0, le=4e9, allow_inf_nan=False)] = 1_500_000_000.0
     """Stamp of the first moment, s since 1970."""

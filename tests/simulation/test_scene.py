@@ -160,3 +160,10 @@ def test_a_scene_beyond_all_memory_and_patience_is_refused(tmp_path, change, mes
         Scene.load(path)
     assert message in caught.value.message
     assert "\n" not in caught.value.message
+
+
+@pytest.mark.parametrize("rate", ["1.0e6", "0.0", ".nan"])
+def test_rates_that_no_sensor_has_are_refused(tmp_path, rate):
+    path = write(tmp_path, f"{HEAD}{DRIVE}scan_rate: {rate}\n")
+    with pytest.raises(ConfigError, match="scan_rate"):
+        Scene.load(path)
