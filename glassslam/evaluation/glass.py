@@ -164,8 +164,8 @@ def evaluate_glass_cells(
     A piece of a centimetre of true glass is detected when the centre of a cell is within the tolerance.
     What is false is a length as well, so that thick lines do not count more than thin ones: false cells are
     thinned to lines of one cell (Zhang and Suen 1984), and these are measured from centre to centre; that
-    makes lines askew longer than they are, by an eighth at most. Thinning takes up to a fifth of a line, and up
-    to half of one within a few degrees of the diagonal.
+    makes lines askew longer than they are, by an eighth at most. Thinning takes up to a fifth of a line, and
+    up to half of one within a few degrees of the diagonal.
 
     Parameters
     ----------
