@@ -10,6 +10,7 @@ from glassslam.session import schema
 
 _MAGIC = b"SQLite format 3\0"
 _HEADER_BYTES = 100
+_ASIDE = ("-wal", "-shm", "-journal")
 _ONE = (1).to_bytes(4, "big")
 _PLACES = (60, 68)  # of the user version and the application id: the file format of SQLite
 
@@ -217,3 +218,10 @@ def write_compact(database: sqlite3.Connection, path: Path, target: Path) -> Non
         for place, value in ((18, b"\1\1"), (24, _ONE), (40, _ONE), (92, _ONE)):
             file.seek(place)
             file.write(value)
+
+
+def remove_logs(path: Path) -> None:
+    """Remove what the database keeps beside a session that is closed: nothing is left to be read from it."""
+    for ending in _ASIDE:
+        with suppress(FileNotFoundError):
+            path.with_name(f"{path.name}{ending}").unlink()

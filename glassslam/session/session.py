@@ -3,7 +3,7 @@
 import os
 import struct
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -20,6 +20,7 @@ from glassslam.session.database import (
     explained,
     open_existing,
     reading,
+    remove_logs,
     write_compact,
 )
 from glassslam.session.identity import Recorded, checked, identify
@@ -41,7 +42,6 @@ from glassslam.sources import SourceOptions
 from glassslam.yamltext import parse_yaml
 
 SESSION_FILE: Final = "session.db"
-_ASIDE = ("-wal", "-shm", "-journal")
 
 
 class Session:
@@ -339,13 +339,6 @@ class Session:
             self.close()
         else:
             self.abandon()
-
-
-def remove_logs(path: Path) -> None:
-    """Remove what the database keeps beside a session that is closed: nothing is left to be read from it."""
-    for ending in _ASIDE:
-        with suppress(FileNotFoundError):
-            path.with_name(f"{path.name}{ending}").unlink()
 
 
 def _options(values: dict[str, Any], sonar: Recorded | None) -> SourceOptions:
