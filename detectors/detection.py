@@ -106,8 +106,3 @@ def from_table(beam: IntArray, table: FloatArray, labels: LabelArray) -> Detecti
     """Build a detection from a kernel's table, one row per observation, columns in the order of `COLUMNS`."""
     columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
     return Detection(beam=beam, labels=labels, **columns)
-
-
-def nothing(labels: LabelArray) -> Detection:
-    """The detection of a scan without glass."""
-    return from_table(np.empty(0, dtype=np.int64), np.empty((0, len(COLUMNS))), labels)

@@ -1,6 +1,5 @@
 """Plain sensor records: what flows from a recording into the mapper."""
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -265,7 +264,3 @@ class Trajectory:
     def __post_init__(self) -> None:
         if self.stamps.ndim != 1 or self.poses.shape != (self.stamps.size, 3):
             raise ValueError(f"poses of shape {self.poses.shape} do not fit {self.stamps.shape} stamps")
-
-
-RecordStream: TypeAlias = Iterable[Record]
-Counts: TypeAlias = Mapping[str, int]

@@ -1,10 +1,10 @@
 """Kernels translated from CasADi compute what CasADi computes, and the committed ones are up to date."""
 
-import importlib.util
+import importlib
 import math
-from pathlib import Path
 
 import casadi as ca
+import generate_kernels as tool
 import numba
 import numpy as np
 import pytest
@@ -13,18 +13,6 @@ from hypothesis import strategies as st
 
 from glassslam.symbolic import render_module, translate
 from glassslam.symbolic.operations import TEMPLATES, literal
-
-ROOT = Path(__file__).resolve().parents[1]
-
-
-def load_tool():
-    spec = importlib.util.spec_from_file_location("generate_kernels", ROOT / "tools" / "generate_kernels.py")
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    return tool
-
-
-TOOL = load_tool()
 
 
 def interpreted(source: str, name: str, kernel=lambda function: function):
@@ -165,16 +153,16 @@ def test_a_module_holds_its_kernels_and_the_version_that_made_them():
     assert source.count("@kernel") == 2
 
 
-MODELS = sorted(TOOL.available())
+MODELS = sorted(tool.available())
 
 
 @pytest.mark.parametrize("module", MODELS)
 def test_the_committed_kernels_are_what_the_model_gives_today(module):
-    text = TOOL.generated_path(module).read_text(encoding="utf-8")
+    text = tool.generated_path(module).read_text(encoding="utf-8")
     generated = importlib.import_module(module.replace(".model", "._generated"))
     if ca.CasadiMeta.version() != generated.CASADI_VERSION:
         pytest.skip(f"written with CasADi {generated.CASADI_VERSION}")
-    assert text == TOOL.source(module)
+    assert text == tool.source(module)
 
 
 @pytest.mark.parametrize("module", MODELS)
@@ -192,11 +180,11 @@ def test_the_committed_kernels_compute_what_the_model_computes(module):
 def test_the_tool_reports_a_stale_file(monkeypatch, tmp_path, capsys):
     model = "glassslam.posegraph.model"
     stale = tmp_path / "_generated.py"
-    monkeypatch.setattr(TOOL, "ROOT", tmp_path)
-    monkeypatch.setattr(TOOL, "available", lambda: {model: ""})
-    monkeypatch.setattr(TOOL, "generated_path", lambda module: stale)
-    assert TOOL.main(["--check"]) == 1
+    monkeypatch.setattr(tool, "ROOT", tmp_path)
+    monkeypatch.setattr(tool, "available", lambda: {model: ""})
+    monkeypatch.setattr(tool, "generated_path", lambda module: stale)
+    assert tool.main(["--check"]) == 1
     assert capsys.readouterr().out == "_generated.py is out of date: run tools/generate_kernels.py\n"
     assert not stale.exists()
-    assert TOOL.main([]) == 0
-    assert TOOL.main(["--check"]) == 0
+    assert tool.main([]) == 0
+    assert tool.main(["--check"]) == 0

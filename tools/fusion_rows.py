@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from pimap_bow import bow_of
@@ -12,7 +12,7 @@ from pimap_truth import PLAN, Plan, draw
 
 from glassslam.api import run_slam
 from glassslam.cli.settings import resolve_config
-from glassslam.config import FusionConfig, SonarConfig
+from glassslam.config import SonarConfig
 from glassslam.errors import RecordingError
 from glassslam.evaluation import ImageErrors, align_maps, evaluate_image, read_glass_cells, read_map
 from glassslam.evaluation.image import PIMAP_UNKNOWN
@@ -49,7 +49,6 @@ POSES = ("Loc", "PG", "FG", "FGfit")
 ALGORITHMS = ("ICL", "ICo", "DS", "BFA")
 LAYERS = ("overlay", "pessimistic", "minmax", "lop", "liop", "iop", "bayes")
 SIDES = {f"{name}, 2 sonars": name for name in (RSF_ALL, OURS)}
-FUSIONS = get_args(FusionConfig.model_fields["method"].annotation)
 VARIANTS: dict[str, dict[str, Any]] = {
     **{kind: {"pose_kind": kind, "fusion": {"method": "attach"}} for kind in POSES},
     **{name: {"algorithm": name, "fusion": {"method": "attach"}} for name in ALGORITHMS},

@@ -76,13 +76,13 @@ def begin(
         with explained_end(target), session:
             try:
                 finished = _slam(source, session, target, manner)
-                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+                with _smaller_map_offered(target):
+                    return conclude(finished, session, target, overwrite=overwrite, manner=manner)
             except (OutputError, InterruptedRunError):
                 raise
             except GlassSlamError as error:
                 if isinstance(error, MapSizeError) and session.is_finished:
-                    hint = f"{error.hint}; poses are kept: glassslam render {target} --set ..."
-                    raise MapSizeError(error.message, hint) from error
+                    raise
                 session.abandon()
                 shutil.rmtree(folder)  # it would fail again
                 raise
@@ -123,7 +123,18 @@ def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -
                 session.load() if session.is_finished else go_on_with(session, recordings, target, manner)
             )
             restore_results(target)
-            return conclude(finished, session, target, overwrite=True, manner=manner)
+            with _smaller_map_offered(target):
+                return conclude(finished, session, target, overwrite=True, manner=manner)
+
+
+@contextmanager
+def _smaller_map_offered(target: Path) -> Iterator[None]:
+    """Tell how to draw the poses of a finished run where their map is too large."""
+    try:
+        yield
+    except MapSizeError as error:
+        hint = f"{error.hint}; poses are kept: glassslam render {target} --set ..."
+        raise MapSizeError(error.message, hint) from error
 
 
 def conclude(

@@ -1,12 +1,12 @@
 """How much of the true glass a run has found, and how much it has made up."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from glassslam.evaluation.cell_lines import drawn_length
 from glassslam.evaluation.glass_alignment import best_alignment
 from glassslam.evaluation.glass_lines import Segments, distances, midpoints
 from glassslam.geometry import transform_points
@@ -162,10 +162,8 @@ def evaluate_glass_cells(
     """Compare the glass cells of a map with true panes, as Table II of Weerakoon et al. 2021 does.
 
     A piece of a centimetre of true glass is detected when the centre of a cell is within the tolerance.
-    What is false is a length as well, so that thick lines do not count more than thin ones: false cells are
-    thinned to lines of one cell (Zhang and Suen 1984), and these are measured from centre to centre; that
-    makes lines askew longer than they are, by an eighth at most. Thinning takes up to a fifth of a line, and
-    up to half of one within a few degrees of the diagonal.
+    What is false is a length as well, so that thick lines do not count more than thin ones: that of the lines
+    false cells draw, in whatever direction (see `cell_lines.drawn_length`).
 
     Parameters
     ----------
@@ -203,29 +201,8 @@ def evaluate_glass_cells(
         true_length=total,
         within=tuple(CellsWithin(*row) for row in zip(limits, found, percent, strict=True)),
         false_cells=int(wrong.sum()),
-        false_length=_drawn_length(cells[wrong], resolution),
+        false_length=drawn_length(cells[wrong], resolution),
     )
-
-
-def _drawn_length(cells: FloatArray, resolution: float) -> float:
-    """Length of the lines that cells make, m: their skeleton from centre to centre, and a cell for each."""
-    if not len(cells):
-        return 0.0
-    from skimage.measure import label  # noqa: PLC0415  (300 ms)
-    from skimage.morphology import skeletonize  # noqa: PLC0415
-
-    index = np.floor(cells / resolution).astype(np.int64)
-    index -= index.min(axis=0) - 1
-    drawn = np.zeros(index.max(axis=0) + 2, dtype=np.bool_)
-    drawn[index[:, 0], index[:, 1]] = True
-    line = skeletonize(drawn)  # type: ignore[no-untyped-call]
-    straight = np.count_nonzero(line[1:] & line[:-1]) + np.count_nonzero(line[:, 1:] & line[:, :-1])
-    # a diagonal step counts where no way round the corner does
-    falling = line[1:, 1:] & line[:-1, :-1] & ~line[1:, :-1] & ~line[:-1, 1:]
-    rising = line[1:, :-1] & line[:-1, 1:] & ~line[1:, 1:] & ~line[:-1, :-1]
-    diagonal = np.count_nonzero(falling) + np.count_nonzero(rising)
-    lines = int(label(line, connectivity=2).max())  # type: ignore[no-untyped-call]
-    return float(resolution * (straight + math.sqrt(2.0) * diagonal + lines))
 
 
 def _joined(lines: Sequence[Segments]) -> Segments:

@@ -18,8 +18,9 @@ from glassslam.glass.observations import GlassObservations
 from glassslam.records import Float32Array, FloatArray, RangeRing, SonarRing
 from glassslam.slam.result import MapResult, OccupancyMap, SonarMaps
 from glassslam.slam.trajectory import PoseTracks
+from glassslam.sonar.beam_width import measure_beam_width
 from glassslam.sonar.glass import sonar_glass_observations
-from glassslam.sonar.mapping import build_sonar_map
+from glassslam.sonar.mapping import beam_width, build_sonar_map
 from glassslam.sonar.poses import PoseKind
 from glassslam.sonar.sweeps import SonarSweeps, placed_sweeps
 
@@ -85,14 +86,16 @@ class SonarListener:
         config, tracks = self._config, result.tracks
         sweeps = self._placed(tracks, config.pose_kind)
         sonar_map = build_sonar_map(sweeps, config)
+        final = sweeps if config.pose_kind == "FGfit" else self._placed(tracks, "FGfit")
         if config.fusion.method == "walls":
-            fused = by_walls(result, self._placed(tracks, "FGfit"), config)
+            fused = by_walls(result, final, config)
         else:
             # the end points of the overlay belong to the sonar layer and keep its poses
-            own = config.pose_kind == "FGfit" or config.fusion.method == "overlay"
-            used = sweeps if own else self._placed(tracks, "FGfit")
+            used = sweeps if config.fusion.method == "overlay" else final
             fused = fuse(config.fusion.method, result.lidar_map, sonar_map, used, config.fusion)
-        maps = SonarMaps(len(sweeps.stamps), sonar_map, fused.map, fused.source)
+        cone = measure_beam_width(final, result.lidar_map)
+        width = beam_width(sweeps, config)
+        maps = SonarMaps(len(sweeps.stamps), width, cone, sonar_map, fused.map, fused.source)
         return replace(result, sonar=maps)
 
     def _placed(self, tracks: PoseTracks, kind: PoseKind) -> SonarSweeps:

@@ -83,15 +83,8 @@ class GlassObservations:
 
     def at(self, node_poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Positions (k, 2), m, and normals (k,), rad, in the map frame for node poses (n, 3)."""
-        return self._placed(self.position, node_poses), wrap_angle(self.normal + node_poses[self.node, 2])
-
-    def sensors_at(self, node_poses: FloatArray) -> FloatArray:
-        """Positions of the sensor (k, 2) in the map frame, m."""
-        return self._placed(self.sensor, node_poses)
-
-    def _placed(self, points: FloatArray, node_poses: FloatArray) -> FloatArray:
         poses = node_poses[self.node]
         cosine, sine = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        x = cosine * points[:, 0] - sine * points[:, 1] + poses[:, 0]
-        y = sine * points[:, 0] + cosine * points[:, 1] + poses[:, 1]
-        return np.stack((x, y), axis=1)
+        x = cosine * self.position[:, 0] - sine * self.position[:, 1] + poses[:, 0]
+        y = sine * self.position[:, 0] + cosine * self.position[:, 1] + poses[:, 1]
+        return np.stack((x, y), axis=1), wrap_angle(self.normal + poses[:, 2])

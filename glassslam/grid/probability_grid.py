@@ -162,11 +162,6 @@ class ProbabilityGrid:
         index = np.floor((points - self.origin) / self.resolution).astype(np.int64)
         self.cells[index[:, 1], index[:, 0]] = self.odds.locked
 
-    def locked_points(self) -> FloatArray:
-        """Centres of the locked cells in the frame of the grid, m, shape (n, 2)."""
-        rows, columns = np.nonzero(self.cells == self.odds.locked)
-        return self.origin + self.resolution * (np.stack((columns, rows), axis=1) + 0.5)
-
     def finish(self) -> None:
         """Crop to the observed cells and drop what only insertion needs."""
         self._marks = np.zeros((0, 0), dtype=np.uint16)

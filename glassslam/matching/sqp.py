@@ -4,7 +4,6 @@ The solver asks through callbacks for the cost, its gradient and the Gauss-Newto
 and write its own memory. Building one costs milliseconds, so every thread keeps those it used.
 """
 
-from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from threading import local
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 from glassslam.matching.kernels import objective
 from glassslam.matching.problem import MatchProblem
 from glassslam.records import FloatArray
-from glassslam.symbolic.callback import SolverCallback, write
+from glassslam.symbolic.callback import CostCallback, SolverCallback, write
 
 _SOLVERS_KEPT = 8
 _thread = local()
@@ -129,24 +128,6 @@ class _Callback(SolverCallback[_Evaluation]):
         return sparsity[self.outputs[index]]
 
 
-class _Cost(_Callback):
-    def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
-        write(results[0], self.evaluation.at(arguments[0])[:1])
-        return 0
-
-    def has_jacobian(self) -> bool:
-        return True
-
-    def get_jacobian(
-        self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]
-    ) -> ca.Function:
-        """Jacobian as CasADi's calculus wants it: asked for when a solver is built, not when it runs."""
-        self._gradient = _Derivatives(self.evaluation, 3)
-        x, p, f = ca.MX.sym("x", 3), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
-        row = self._gradient(x, p)[1].T
-        return ca.Function(name, [x, p, f], [row, ca.MX(1, 0)], inputs, outputs, options)
-
-
 class _Derivatives(_Callback):
     outputs = ("f", "grad_f_x", "g", "jac_g_x")
 
@@ -154,6 +135,14 @@ class _Derivatives(_Callback):
         values = self.evaluation.at(arguments[0])
         write(results[0], values[:1])
         write(results[1], values[1:4])
+        return 0
+
+
+class _Cost(CostCallback[_Evaluation]):
+    derivatives = _Derivatives
+
+    def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
+        write(results[0], self.evaluation.at(arguments[0])[:1])
         return 0
 
 

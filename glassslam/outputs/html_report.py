@@ -91,7 +91,7 @@ def _sections(result: MapResult, report: dict[str, Any], folder: Path) -> Iterat
     yield section("Run", facts(_short(run_rows(report))))
     yield section("Uncertain stretches", _uncertain(report))
     yield section("Glass", facts(_short(glass_rows(report["glass"]))) + _walls(result))
-    yield section("Sonar", facts(_short(sonar_rows(result.sonar, result.config.sonar))))
+    yield section("Sonar", facts(_short(sonar_rows(report["sonar"]))))
     yield section("Volume", facts(_short(volume_rows(report["volume"]))))
     yield section("Recording", facts(_short(recording_rows(report))))
     yield section("Time and memory", facts(_short(cost_rows(report))))

@@ -6,10 +6,8 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from glassslam.records import Damage
-from glassslam.slam.result import SonarMaps
 
 if TYPE_CHECKING:
-    from glassslam.config import SonarConfig
     from glassslam.glass.walls import GlassWall
 
 Report: TypeAlias = dict[str, Any]
@@ -123,13 +121,25 @@ def glass_rows(glass: dict[str, Any]) -> Rows:
     yield "ghost cells", f"{glass['ghost_cells']}"
 
 
-def sonar_rows(sonar: SonarMaps | None, config: "SonarConfig") -> Rows:
+def sonar_rows(sonar: Report | None) -> Rows:
     """What the sonars have seen, and how it was joined with the lidar."""
     if sonar is None:
         return
-    yield "sweeps", f"{sonar.sweeps}"
-    yield "sonar map", f"{config.algorithm}, poses {config.pose_kind}"
-    yield "joined by", config.fusion.method
+    yield "sweeps", f"{sonar['sweeps']}"
+    yield "sonar map", f"{sonar['algorithm']}, poses {sonar['pose_kind']}"
+    yield "joined by", sonar["fusion"]
+    cone = sonar["cone"]
+    yield "cone", f"{cone['used_deg']:.0f} deg"
+    if cone["measured_deg"] is None:
+        yield "cone as measured", f"not known: the map explains {cone['readings']} readings only"
+        return
+    low, high = cone["between_deg"]
+    measured = f"{cone['measured_deg']:.0f} deg ({low:.0f} to {high:.0f}), from {cone['readings']} readings"
+    yield "cone as measured", measured
+    yield (
+        "ranges",
+        f"{100.0 * cone['bias_m']:+.1f} cm of the lidar's, spread {100.0 * cone['spread_m']:.1f} cm",
+    )
 
 
 def volume_rows(volume: Report | None) -> Rows:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from glassslam.outputs.sonar_maps import describe_sonar
 from glassslam.outputs.volume_maps import describe_volume
 from glassslam.records import Trajectory
 from glassslam.slam.result import MapResult, RunStatistics
@@ -116,6 +117,7 @@ def build_report(result: MapResult, usage: Usage | None = None) -> dict[str, Any
             "origin": list(result.map.origin),
         },
         "glass": _glass(result),
+        "sonar": describe_sonar(result),
         "volume": describe_volume(result),
         "warnings": list(statistics.warnings),
         "versions": versions(),

@@ -1,6 +1,8 @@
-"""Maps of the sonars, and of lidar and sonar together."""
+"""Maps of the sonars, of lidar and sonar together, and what is reported of them."""
 
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +35,35 @@ def write_sonar_maps(result: MapResult, folder: Path) -> list[Path]:
     if result.sonar.source is not None:
         written.append(write_sources(result.sonar.source, folder / "source_map.png"))
     return written
+
+
+def describe_sonar(result: MapResult) -> dict[str, Any] | None:
+    """What the sonars did, in numbers, for the report; None where there were none.
+
+    Parameters
+    ----------
+    result : MapResult
+        The run.
+    """
+    sonar, config = result.sonar, result.config.sonar
+    if sonar is None:
+        return None
+    cone = sonar.cone
+    is_measured = not math.isnan(cone.width)
+    return {
+        "sweeps": sonar.sweeps,
+        "algorithm": config.algorithm,
+        "pose_kind": config.pose_kind,
+        "fusion": config.fusion.method,
+        "cone": {
+            "used_deg": math.degrees(sonar.cone_width),
+            "measured_deg": math.degrees(cone.width) if is_measured else None,
+            "between_deg": [math.degrees(cone.low), math.degrees(cone.high)] if is_measured else None,
+            "readings": cone.readings,
+            "bias_m": cone.bias if is_measured else None,
+            "spread_m": cone.spread if is_measured else None,
+        },
+    }
 
 
 def write_sources(source: NDArray[np.uint8], path: Path) -> Path:

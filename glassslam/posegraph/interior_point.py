@@ -1,6 +1,5 @@
 """CasADi's interface to IPOPT on the generated kernels: the second opinion beside the own solver."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi as ca
@@ -11,7 +10,7 @@ from glassslam.posegraph.levenberg_marquardt import Solution
 from glassslam.posegraph.structure import Structure
 from glassslam.posegraph.system import System
 from glassslam.records import FloatArray
-from glassslam.symbolic.callback import SolverCallback, read, write
+from glassslam.symbolic.callback import CostCallback, SolverCallback, read, write
 
 
 def minimise(system: System, poses: FloatArray, max_iterations: int, tolerance: float) -> Solution:
@@ -81,28 +80,6 @@ class _Evaluation:
         return self._cost
 
 
-class _Cost(SolverCallback[_Evaluation]):
-    def get_sparsity_out(self, index: int) -> ca.Sparsity:  # noqa: ARG002
-        return ca.Sparsity.dense(1, 1)
-
-    def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
-        evaluation = self.evaluation
-        write(results[0], evaluation.system.cost(evaluation.placed(read(arguments[0]))))
-        return 0
-
-    def has_jacobian(self) -> bool:
-        return True
-
-    def get_jacobian(
-        self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]
-    ) -> ca.Function:
-        """Jacobian as CasADi's calculus wants it, from the gradient callback."""
-        self._gradient = _Gradient(self.evaluation, self.variables)
-        x, p, f = ca.MX.sym("x", self.variables), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
-        row = self._gradient(x, p)[1].T
-        return ca.Function(name, [x, p, f], [row, ca.MX(1, 0)], inputs, outputs, options)
-
-
 class _Gradient(SolverCallback[_Evaluation]):
     outputs = ("f", "grad_f_x")
 
@@ -112,6 +89,15 @@ class _Gradient(SolverCallback[_Evaluation]):
     def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
         write(results[0], self.evaluation.linearised(read(arguments[0])))
         write(results[1], self.evaluation.system.gradient.ravel())
+        return 0
+
+
+class _Cost(CostCallback[_Evaluation]):
+    derivatives = _Gradient
+
+    def eval_buffer(self, arguments: tuple[Any, ...], results: tuple[Any, ...]) -> int:
+        evaluation = self.evaluation
+        write(results[0], evaluation.system.cost(evaluation.placed(read(arguments[0]))))
         return 0
 
 

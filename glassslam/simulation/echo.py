@@ -15,9 +15,6 @@ from glassslam.simulation.raycast import SegmentGrid
 from glassslam.simulation.sensors import LidarModel
 from glassslam.simulation.trace_kernels import Echoes, Legs, Plan, trace_scan
 
-NOBODY = Legs(np.empty((0, 5)), np.empty(0))
-"""A scene without people."""
-
 
 @dataclass(frozen=True, slots=True)
 class Observation:

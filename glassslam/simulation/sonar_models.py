@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 from glassslam.records import SonarRing
 from glassslam.sources.rings import load_ring
 
-SOURCES = (
-    "errors: sonars facing glass, wood and sponge, below 5 % and 11 cm at most (Wei et al., Fig. 5)",
-    "firing: a Pioneer fires one sonar of its front and one of its rear array every 40 ms",
-)
-"""Where the default figures of a `SonarModel` come from."""
-
 
 @dataclass(frozen=True, slots=True)
 class SonarModel:
-    """Everything the simulation knows of a ring of sonars; `SOURCES` says where the defaults are from.
+    """Everything the simulation knows of a ring of sonars.
+
+    The default errors are those of sonars that face glass, wood and sponge: below 5 %, and 11 cm at most
+    (Wei et al., Fig. 5). A Pioneer fires one sonar of its front and one of its rear array every 40 ms.
 
     Attributes
     ----------

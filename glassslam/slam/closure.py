@@ -13,7 +13,8 @@ from glassslam.matching.gradient import MatchResult
 from glassslam.matching.profile_kernels import flat_reach
 from glassslam.records import FloatArray
 from glassslam.slam.neighbourhood import Neighbourhood
-from glassslam.slam.wide_search import WidePlace, find_wide_place, refined
+from glassslam.slam.refinement import refined
+from glassslam.slam.wide_search import WidePlace, find_wide_place
 
 _DIRECT_LINEAR, _DIRECT_ANGULAR = 0.25, 0.1
 _INFORMATION_SCALE = 100.0
@@ -167,11 +168,11 @@ def _located(
     """Where the scene fits best in the window; None when nowhere."""
     guess = compose(candidate.anchor_in_local, candidate.anchor_from_node)
     if matcher is None:
-        return refined(scene, grid, guess)
+        return refined(grid, scene.fine, guess)
     found = matcher.match(
         scene.coarse, guess, candidate.linear_window, candidate.angular_window, config.min_score
     )
-    return None if found is None else refined(scene, grid, found.pose)
+    return None if found is None else refined(grid, scene.fine, found.pose)
 
 
 def _is_contradicted(

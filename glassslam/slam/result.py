@@ -14,7 +14,8 @@ from glassslam.records import Damage, Float32Array, FloatArray, RecordingInfo, T
 from glassslam.slam.node import Node
 from glassslam.slam.trajectory import PoseTracks
 
-if TYPE_CHECKING:  # volumes are made of results; results only hold them
+if TYPE_CHECKING:  # made of results, which only hold them
+    from glassslam.sonar.beam_width import BeamWidth
     from glassslam.volume.octree import Octree
 
 
@@ -146,6 +147,10 @@ class SonarMaps:
     ----------
     sweeps : int
         Sweeps within the time of the lidar.
+    cone_width : float
+        Full width of the cones in use, rad.
+    cone : BeamWidth
+        How wide the cones of the sonars are, measured against the map of the lidar.
     sonar_map : OccupancyMap
         Map of the sonars alone.
     fused_map : OccupancyMap
@@ -156,6 +161,8 @@ class SonarMaps:
     """
 
     sweeps: int
+    cone_width: float
+    cone: "BeamWidth"
     sonar_map: OccupancyMap
     fused_map: OccupancyMap
     source: NDArray[np.uint8] | None

@@ -12,11 +12,11 @@ from glassslam.records import FloatArray
 from glassslam.slam.extrapolator import Prediction
 from glassslam.slam.hold_kernels import hold_of, known_share
 from glassslam.slam.range_data import RangeData, thin_adaptively
+from glassslam.slam.refinement import refined
 from glassslam.slam.tracking import Event, How, Match, Tracking
 
 _CALM_DISTANCE = 0.1
 _CALM_ROTATION = 0.05
-_WEAK_WEIGHT = 0.03
 _COASTING_SHARE = 0.3
 _LOST_RATIO = 1.15
 _LOST_AFTER_GAP = 1.05
@@ -168,11 +168,11 @@ class Tracker:
             local.search_linear_window,
             math.radians(local.search_angular_window_deg),
         )
-        refined = self._refine(grid, points, start)
-        if refined.residual < found.match.residual - gain:
+        better = self._refined(grid, points, start)
+        if better.residual < found.match.residual - gain:
             self.tracking.searches_taken += 1
             self.tracking.doubtful |= gain >= _SEARCH_GAIN
-            return _Fit(refined, How.SEARCHED)
+            return _Fit(better, How.SEARCHED)
         return found
 
     def _relocalise(self, grid: ProbabilityGrid, points: FloatArray, found: _Fit, gain: float) -> _Fit:
@@ -186,23 +186,20 @@ class Tracker:
         match = matcher.match(coarse, found.match.pose, _LOST_WINDOW, _LOST_TURN, _LOST_SCORE)
         if match is None:
             return found
-        refined = self._refine(grid, points, match.pose)
-        if refined.residual < found.match.residual - gain:
+        better = self._refined(grid, points, match.pose)
+        if better.residual < found.match.residual - gain:
             self.tracking.relocalised += 1
             self.tracking.doubtful = True
-            return _Fit(refined, How.RELOCALISED)
+            return _Fit(better, How.RELOCALISED)
         return found
 
-    def _refine(self, grid: ProbabilityGrid, points: FloatArray, start: FloatArray) -> MatchResult:
-        """Gradient match from the result of a search, which odometry has no say in."""
+    def _refined(self, grid: ProbabilityGrid, points: FloatArray, start: FloatArray) -> MatchResult:
         local = self._config.local
-        return match_scan(
+        return refined(
             grid,
             points,
             start,
             occupied_space_weight=local.occupied_space_weight,
-            translation_weight=_WEAK_WEIGHT,
-            rotation_weight=_WEAK_WEIGHT,
             max_iterations=local.max_num_iterations,
             solver=local.solver,
         )

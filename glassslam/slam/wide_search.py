@@ -13,12 +13,12 @@ from glassslam.config import LoopClosureConfig
 from glassslam.geometry import between
 from glassslam.grid.probability_grid import ProbabilityGrid
 from glassslam.matching.branch_and_bound import BranchAndBoundMatcher
-from glassslam.matching.gradient import MatchResult, match_scan
+from glassslam.matching.gradient import MatchResult
 from glassslam.records import FloatArray
 from glassslam.slam.hold_kernels import known_share
 from glassslam.slam.neighbourhood import Neighbourhood
+from glassslam.slam.refinement import refined
 
-_WEAK_WEIGHT = 0.03
 _CLEARLY_BETTER = 0.03
 _RIVAL_DISTANCE, _RIVAL_TURN = 1.0, 0.5
 _LEAST_KNOWN, _WORST_RESIDUAL = 0.5, 0.46
@@ -38,18 +38,6 @@ class WidePlace:
 
     match: MatchResult
     objection: str
-
-
-def refined(scene: Neighbourhood, grid: ProbabilityGrid, guess: FloatArray) -> MatchResult:
-    """Gradient match of a scene from a guess in the frame of the grid, m and rad."""
-    return match_scan(
-        grid,
-        scene.fine,
-        guess,
-        translation_weight=_WEAK_WEIGHT,
-        rotation_weight=_WEAK_WEIGHT,
-        max_iterations=30,
-    )
 
 
 def find_wide_place(
@@ -89,9 +77,9 @@ def find_wide_place(
     def searched(heading: float, angular_window: float) -> list[MatchResult]:
         around = np.array([center[0], center[1], heading])
         found = matcher.match(scene.coarse, around, linear_window, angular_window, config.min_score)
-        return [] if found is None else [refined(scene, grid, found.pose)]
+        return [] if found is None else [refined(grid, scene.fine, found.pose)]
 
-    places = [*searched(center[2], math.pi), refined(scene, grid, guess)]
+    places = [*searched(center[2], math.pi), refined(grid, scene.fine, guess)]
     best = min(places, key=_residual)
     if best.residual > _WORST_RESIDUAL or _known(scene, grid, best.pose) < _LEAST_KNOWN:
         return WidePlace(best, "poor fit") if len(places) > 1 else None

@@ -14,6 +14,7 @@ _HALF_WIDTHS = np.radians(np.arange(1.0, 46.0))
 _RAYS_BETWEEN = 2
 _OCCUPIED = 0.65
 _FEWEST = 50
+_MOST = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,7 @@ def measure_beam_width(
     """Effective cone width: the one whose nearest lidar surface agrees with most readings.
 
     Readings that no cone up to 45 degrees to each side explains (glass, things below the plane of the
-    lidar, cross-talk) say nothing about the width and are left out.
+    lidar, cross-talk) say nothing about the width and are left out. Of very many readings 5000 are looked at.
 
     Parameters
     ----------
@@ -71,7 +72,8 @@ def measure_beam_width(
         Of the bootstrap.
     """
     use = np.isfinite(sweeps.ranges) & (sweeps.ranges >= sweeps.ring.range_min) & (sweeps.ranges <= max_range)
-    ranges, rays = sweeps.ranges[use], sweeps.sensors[use].copy()
+    stride = 1 + int(np.count_nonzero(use)) // _MOST
+    ranges, rays = sweeps.ranges[use][::stride], sweeps.sensors[use][::stride].copy()
     rays[:, :2] = (rays[:, :2] - np.asarray(lidar_map.origin)) / lidar_map.resolution
     nearest = np.empty((len(rays), len(_HALF_WIDTHS)))
     reach = (max_range + 2.0 * tolerance) / lidar_map.resolution

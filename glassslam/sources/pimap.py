@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.errors import RecordingError
-from glassslam.records import Damage, FloatArray, Trajectory
+from glassslam.records import Damage, FloatArray
 from glassslam.sources.failures import reading
 from glassslam.sources.formats import Piece
-from glassslam.sources.textlines import TextLog, single, text_damage
+from glassslam.sources.textlines import TextLog, text_damage
 
 _TICKS_AT_1970 = 621_355_968_000_000_000
 _TICKS_PER_S = 10_000_000
@@ -95,50 +95,6 @@ def read_pimap(path: str | Path, *, strict: bool = False) -> PimapLog:
     times, places, values = times[sound], places[sound], values[sound]
     damage = text_damage([log], len(times), float(times[0]), float(times[-1]))
     return PimapLog(times, places, values, rows.seen - len(times), damage)
-
-
-def read_pimap_sonar(path: str | Path) -> tuple[FloatArray, NDArray[np.float32]]:
-    """Times and sweeps of a sonar log.
-
-    Parameters
-    ----------
-    path : str or Path
-        The log.
-
-    Returns
-    -------
-    times : ndarray of float64, shape (m,)
-        Seconds since 1970, on the clock of the scan headers.
-    ranges : ndarray of float32, shape (m, n)
-        As recorded, m.
-
-    Raises
-    ------
-    RecordingError
-        As by `read_pimap`.
-    """
-    log = read_pimap(path)
-    return log.sweep_times, single(log.values)
-
-
-def read_pimap_poses(path: str | Path) -> Trajectory:
-    """Poses of a pose log, one for every lidar scan; lines that repeat a pose are left out.
-
-    Parameters
-    ----------
-    path : str or Path
-        The log.
-
-    Raises
-    ------
-    RecordingError
-        As by `read_pimap`; or the log holds something else.
-    """
-    log = read_pimap(path)
-    if log.values.shape[1] != POSE_VALUES:
-        raise RecordingError(f"{path} holds {log.values.shape[1]} values a line, not x, y and heading")
-    first = np.append(True, np.diff(log.times) != 0.0)
-    return Trajectory(log.times[first], log.values[first])
 
 
 @dataclass(slots=True)

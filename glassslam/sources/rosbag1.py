@@ -69,10 +69,6 @@ class Ros1Bag:
         """Nothing to keep open: each reading has its own file."""
         return nullcontext()
 
-    def record_times(self, topic: Topic) -> NDArray[np.int64]:
-        """Record times of a topic in file order, ns."""
-        return self._index[topic.name, topic.msgtype][:, _TIME]
-
     def messages(
         self, topics: Collection[Topic], start: int | None = None, stop: int | None = None
     ) -> Generator[Raw, None, None]:

@@ -125,15 +125,15 @@ def _storage(piece: Piece, *, strict: bool) -> Storage:
         with reading(piece.path, piece.format):
             directory = Directory(piece.path, strict=strict)
             directory.open()
-            damaged = bool(directory.damage) or directory.holds_more
-            packed = directory.metadata.compression_mode == "message"
+            needs_files = directory.is_in_doubt or directory.metadata.compression_mode == "message"
             directory.close()
     except RecordingError as error:
         if strict or not directory_files(piece):
             raise
         return Files(directory_files(piece), piece.format, [metadata_damage(piece, error)])
-    # What metadata count may hold no longer; and packed messages are unpacked within bounds there.
-    return Files(directory_files(piece), piece.format, ()) if damaged or packed else directory
+    # A topic may be in damaged files alone; and packed messages are unpacked within bounds there.
+    files = directory_files(piece) if needs_files else []
+    return Files(files, piece.format, ()) if files else directory
 
 
 def _is_cdr(connection: Connection) -> bool:

@@ -44,7 +44,8 @@ class Directory(DirectoryReader):
         _check_metadata(path / METADATA)
         super().__init__(path)
         self._strict = strict
-        self._opened: dict[Path, FileStorage] = {}
+        self._opened: dict[str, FileStorage] = {}
+        self._miscounted: tuple[Damage, ...] = ()
         plugins: Any = {"mcap": self._plugin("rosbag2-mcap"), "sqlite3": self._plugin("rosbag2-sqlite3")}
         self.STORAGE_PLUGINS = plugins
 
@@ -54,22 +55,36 @@ class Directory(DirectoryReader):
         if packed:
             _check_room(packed)
         super().open()
+        # Metadata may lie: what they tell of times, topics and counts is not asked where the files know.
+        told, known = self.metadata, span_of([storage.metadata for storage in self._opened.values()])
+        self._miscounted = self._miscount(told.message_count, known.message_count)
+        self.metadata = known._replace(compression_mode=told.compression_mode)
+        self.connections = [c for storage in self._opened.values() for c in storage.connections]
 
     @property
     def damage(self) -> tuple[Damage, ...]:
-        """What could not be read so far."""
-        return tuple(part for storage in self._opened.values() for part in storage.damage)
+        """What could not be read so far, and of which messages only the metadata know."""
+        return tuple(part for file in self._opened.values() for part in file.damage) or self._miscounted
+
+    def _miscount(self, told: object, held: int) -> tuple[Damage, ...]:
+        if told == held:
+            return ()
+        lost = told - held if isinstance(told, int) and held < told < 2**63 else 0
+        reason = f"it counts other messages than the {held} of its files"
+        return (Damage(str(self.path / METADATA), 0, 0, None, None, lost, reason),)
 
     @property
-    def holds_more(self) -> bool:
-        """Whether a recorder has left something beside a file, of which the metadata may not know."""
-        return any(isinstance(s, SqliteStorage) and s.is_scanned for s in self._opened.values())
+    def is_in_doubt(self) -> bool:
+        """Whether a file is damaged, or a recorder has left something beside it."""
+        files = self._opened.values()
+        return any(file.damage or (isinstance(file, SqliteStorage) and file.is_scanned) for file in files)
 
     def _plugin(self, format_name: str) -> Callable[[Path], FileStorage]:
         def storage_of(path: Path) -> FileStorage:
-            if path not in self._opened:
-                self._opened[path] = file_storage(path, format_name, strict=self._strict)
-            return self._opened[path]
+            known = self._opened.get(path.name)
+            if known is None or known.file_path != path:  # packed files are unpacked anew every time
+                known = self._opened[path.name] = file_storage(path, format_name, strict=self._strict)
+            return known
 
         return storage_of
 
@@ -101,11 +116,7 @@ class Files:
                 self._lost.append(_unreadable(storage, error))
         if not self._storages:
             raise errors[0] if errors else RecordingError("no file of the bag can be read")
-        spans = [storage.metadata for storage in self._storages if storage.metadata.message_count]
-        start = min((span.start_time for span in spans), default=2**63 - 1)
-        end = max((span.end_time for span in spans), default=0)
-        count = sum(span.message_count for span in spans)
-        self.metadata = ReaderMetadata(max(0, end - start), start, end, count, None, None, None, None)
+        self.metadata = span_of([storage.metadata for storage in self._storages])
         self.connections = [connection for storage in self._storages for connection in storage.connections]
 
     def close(self) -> None:
@@ -123,6 +134,15 @@ class Files:
             if own:
                 for connection, time, raw in storage.messages(own, start, stop):
                     yield connection, time, plain_message(raw)
+
+
+def span_of(files: Sequence[ReaderMetadata]) -> ReaderMetadata:
+    """Times and number of the messages of several files."""
+    filled = [file for file in files if file.message_count]
+    start = min((file.start_time for file in filled), default=2**63 - 1)
+    end = max((file.end_time for file in filled), default=0)
+    count = sum(file.message_count for file in filled)
+    return ReaderMetadata(max(0, end - start), start, end, count, None, None, None, None)
 
 
 def plain_message(raw: bytes) -> bytes:

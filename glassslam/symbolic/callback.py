@@ -1,5 +1,6 @@
 """What the callbacks of CasADi's solvers have in common: names, shapes and access to the solver's memory."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 import casadi as ca
@@ -54,6 +55,29 @@ class SolverCallback(ca.Callback, Generic[_E]):
     def has_eval_buffer(self) -> bool:
         """Say that values are computed in the memory of the solver."""
         return True
+
+
+class CostCallback(SolverCallback[_E]):
+    """The cost as a function (x, p); `derivatives` is the callback whose second output is its gradient."""
+
+    derivatives: type[SolverCallback[Any]]
+
+    def get_sparsity_out(self, index: int) -> ca.Sparsity:  # noqa: ARG002
+        """Shape of the output."""
+        return ca.Sparsity.dense(1, 1)
+
+    def has_jacobian(self) -> bool:
+        """Say that there is a Jacobian."""
+        return True
+
+    def get_jacobian(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Mapping[str, Any]
+    ) -> ca.Function:
+        """Jacobian as CasADi's calculus wants it: asked for when a solver is built, not when it runs."""
+        self._gradient = self.derivatives(self.evaluation, self.variables)
+        x, p, f = ca.MX.sym("x", self.variables), ca.MX.sym("p", 0, 0), ca.MX.sym("f")
+        row = self._gradient(x, p)[1].T
+        return ca.Function(name, [x, p, f], [row, ca.MX(1, 0)], inputs, outputs, options)
 
 
 def read(buffer: Any) -> FloatArray:

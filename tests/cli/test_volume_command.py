@@ -50,16 +50,22 @@ def truth(bag):
     return str(bag.with_name("room.bag.truth.tum"))
 
 
-def test_a_recording_becomes_a_volume(bag, tmp_path, capsys):
-    assert main(["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")]) == 0
+@pytest.fixture
+def command(bag, tmp_path):
+    """A volume of the recording along its true trajectory, into `run`."""
+    return ["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")]
+
+
+def test_a_recording_becomes_a_volume(command, tmp_path, capsys):
+    assert main(command) == 0
     out = capsys.readouterr().out
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == sorted(FILES)
     assert all(f"wrote {tmp_path / 'run' / name}\n" in out for name in FILES)
     assert "occupied voxels of 0.05 m" in out
 
 
-def test_the_map_holds_the_lamp_and_the_volume_its_height(bag, tmp_path):
-    main(["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")])
+def test_the_map_holds_the_lamp_and_the_volume_its_height(command, tmp_path):
+    main(command)
     grid = read_map(tmp_path / "run" / "volume_map.yaml")
     column, row = (int((v - o) / 0.05) for v, o in zip((4.3, 3.0), grid.origin, strict=True))
     assert (grid.probability[row - 2 : row + 3, column - 1 : column + 2] == 1.0).any()
@@ -70,19 +76,9 @@ def test_the_map_holds_the_lamp_and_the_volume_its_height(bag, tmp_path):
     assert 0.7 < lamp[:, 2].min() < lamp[:, 2].max() < 1.3
 
 
-def test_the_summary_is_json_on_request(bag, tmp_path, capsys):
-    words = [
-        "volume",
-        str(bag),
-        "--trajectory",
-        truth(bag),
-        "-o",
-        str(tmp_path / "run"),
-        "--json",
-        "--pool",
-        "iop",
-    ]
-    assert main([*words, "--resolution", "0.1", "--projection", "pool", "--band", "0.5", "1.5"]) == 0
+def test_the_summary_is_json_on_request(command, capsys):
+    command += ["--json", "--pool", "iop", "--resolution", "0.1"]
+    assert main([*command, "--projection", "pool", "--band", "0.5", "1.5"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["resolution"] == 0.1
     assert summary["scans"] > 10
@@ -91,22 +87,13 @@ def test_the_summary_is_json_on_request(bag, tmp_path, capsys):
     assert [path.rsplit("/", 1)[-1] for path in summary["written"]] == FILES
 
 
-def test_earlier_results_are_replaced_only_when_asked(bag, tmp_path, capsys):
-    words = [
-        "volume",
-        str(bag),
-        "--trajectory",
-        truth(bag),
-        "-o",
-        str(tmp_path / "run"),
-        "--resolution",
-        "0.2",
-    ]
-    assert main(words) == 0
+def test_earlier_results_are_replaced_only_when_asked(command, tmp_path, capsys):
+    command += ["--resolution", "0.2"]
+    assert main(command) == 0
     capsys.readouterr()
-    assert main(words) == 2
+    assert main(command) == 2
     assert "already holds volume.npz (use --overwrite to replace it)" in capsys.readouterr().err
-    assert main([*words, "--overwrite"]) == 0
+    assert main([*command, "--overwrite"]) == 0
 
 
 def test_a_band_must_hold_some_height(bag, tmp_path, capsys):
@@ -198,9 +185,8 @@ def test_the_points_can_be_named(bag, tmp_path, capsys, option):
     assert made(bag, tmp_path, capsys, option, "none")["point_sets"] == 0
 
 
-def test_it_can_be_quiet(bag, tmp_path, capsys):
-    words = ["volume", str(bag), "--trajectory", truth(bag), "-o", str(tmp_path / "run")]
-    assert main([*words, "--resolution", "0.2", "--quiet"]) == 0
+def test_it_can_be_quiet(command, tmp_path, capsys):
+    assert main([*command, "--resolution", "0.2", "--quiet"]) == 0
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "")
     assert (tmp_path / "run" / "volume.npz").is_file()

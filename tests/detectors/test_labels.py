@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from detectors.detection import COLUMNS, Detection, from_table, nothing
+from detectors.detection import COLUMNS, Detection, from_table
 from detectors.labels import GHOST, GLASS, INVALID, NAMES, NO_RETURN, SOLID, base_labels
 
 
@@ -48,10 +48,6 @@ def test_selecting_observations_keeps_all_labels():
 def test_positions_are_end_points_in_the_laser_frame():
     found = two()
     np.testing.assert_allclose(found.positions[1], [9 * np.cos(10.0), 9 * np.sin(10.0)])
-
-
-def test_nothing_is_a_detection_without_observations():
-    assert len(nothing(np.ones(4, dtype=np.uint8))) == 0
 
 
 def test_columns_of_different_length_are_refused():

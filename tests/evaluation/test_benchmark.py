@@ -1,25 +1,14 @@
 """tools/benchmark.py."""
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
 
+import benchmark
 import pytest
 
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "benchmark.py"
 
-
-@pytest.fixture(scope="module")
-def benchmark_tool():
-    spec = importlib.util.spec_from_file_location("benchmark_tool", TOOL)
-    module = sys.modules["benchmark_tool"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["benchmark_tool"]
-
-
-def a_run(tool, **changes):
+def a_run(**changes):
     values = {
         "log": "aces",
         "recording": "aces.clf.gz",
@@ -36,16 +25,16 @@ def a_run(tool, **changes):
         "unmatched": 0,
         "trajectory": b"",
     }
-    return tool.Run(**{**values, **changes})
+    return benchmark.Run(**{**values, **changes})
 
 
-def cells(tool, run):
-    return [next(iter(column.cells)) for column in tool.build_table([run]).columns]
+def cells(run):
+    return [next(iter(column.cells)) for column in benchmark.build_table([run]).columns]
 
 
-def test_a_child_is_measured(benchmark_tool):
+def test_a_child_is_measured():
     code = "import sys; block = bytearray(90_000_000); sum(range(3_000_000)); sys.exit(3)"
-    exit_code, cpu, wall, peak_mb = benchmark_tool.measure([sys.executable, "-c", code])
+    exit_code, cpu, wall, peak_mb = benchmark.measure([sys.executable, "-c", code])
     assert exit_code == 3
     assert cpu > 0.0
     assert wall > 0.0
@@ -53,16 +42,16 @@ def test_a_child_is_measured(benchmark_tool):
     assert peak_mb > 90.0
 
 
-def test_carmen_logs_come_by_default_and_bags_on_demand(benchmark_tool):
+def test_carmen_logs_come_by_default_and_bags_on_demand():
     def names(**options):
-        return [path.name for _, path in benchmark_tool.select_recordings(Path("f"), **options)]
+        return [path.name for _, path in benchmark.select_recordings(Path("f"), **options)]
 
     assert names(logs=["intel", "mit-csail"], bags=False) == ["intel.clf.gz", "mit-csail.clf.gz"]
     assert names(logs=["intel", "mit-csail"], bags=True) == ["intel.clf.gz", "intel.bag", "mit-csail.clf.gz"]
 
 
-def test_targets_reached_are_green_and_set_beside_the_peers(benchmark_tool):
-    row = cells(benchmark_tool, a_run(benchmark_tool))
+def test_targets_reached_are_green_and_set_beside_the_peers():
+    row = cells(a_run())
     assert row[0] == "aces.clf.gz"
     assert row[1] == "[green]0.0375[/] +- 0.0300 (0.0375, 0.0375, 0.0378)"
     assert row[2] == "[green]0.373[/] +- 0.400 (0.373, 0.373, 0.501)"
@@ -73,13 +62,13 @@ def test_targets_reached_are_green_and_set_beside_the_peers(benchmark_tool):
     ("column", "change"),
     [(1, {"translation": 0.0376}), (2, {"rotation": 0.374}), (3, {"cpu": 10.1}), (6, {"peak_mb": 338.0})],
 )
-def test_targets_missed_are_red(benchmark_tool, column, change):
-    row = cells(benchmark_tool, a_run(benchmark_tool, **change))
+def test_targets_missed_are_red(column, change):
+    row = cells(a_run(**change))
     assert [number for number, cell in enumerate(row) if "[red]" in cell] == [column]
 
 
-def test_figures_are_printed_for_scripts(benchmark_tool, capsys):
-    benchmark_tool._show([a_run(benchmark_tool)], as_json=True)
+def test_figures_are_printed_for_scripts(capsys):
+    benchmark._show([a_run()], as_json=True)
     (row,) = json.loads(capsys.readouterr().out)
     assert row["translation"] == 0.0375
     assert "trajectory" not in row

@@ -1,24 +1,12 @@
 """tools/fusion_causes.py."""
 
-import importlib
-import sys
-from pathlib import Path
-
+import fusion_causes as tool
 import numpy as np
 import pytest
 from rich.console import Console
 
-TOOLS = Path(__file__).resolve().parents[2] / "tools"
 
-
-@pytest.fixture(scope="module")
-def tool():
-    sys.path.insert(0, str(TOOLS))
-    yield importlib.import_module("fusion_causes")
-    sys.path.remove(str(TOOLS))
-
-
-def test_every_cell_belongs_to_one_region_the_nearest_wall_first(tool):
+def test_every_cell_belongs_to_one_region_the_nearest_wall_first():
     """A wall on the left, a pane above, free space between, and more behind the pane."""
     true = np.zeros((14, 12), dtype=np.uint8)
     true[:7] = 1
@@ -39,7 +27,7 @@ def test_every_cell_belongs_to_one_region_the_nearest_wall_first(tool):
     ]
 
 
-def test_an_experiment_that_is_none_and_a_folder_without_the_hallway_are_refused(tool, tmp_path, capsys):
+def test_an_experiment_that_is_none_and_a_folder_without_the_hallway_are_refused(tmp_path, capsys):
     with pytest.raises(SystemExit):
         tool.main(["--data", str(tmp_path), "wieghts"])
     assert (
@@ -50,7 +38,7 @@ def test_an_experiment_that_is_none_and_a_folder_without_the_hallway_are_refused
 
 
 @pytest.fixture(scope="module")
-def tables(tool, data_dir, tmp_path_factory):
+def tables(data_dir, tmp_path_factory):
     one = tool.hallway(data_dir, tool.true_hallway(tmp_path_factory.mktemp("truth")))
     run = tool.finished(one)
 

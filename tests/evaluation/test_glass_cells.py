@@ -93,8 +93,19 @@ def test_the_map_may_lie_in_another_frame(angle, x, y):
 
 @given(st.floats(0, np.pi))
 def test_the_length_of_a_line_hardly_depends_on_its_direction(angle):
-    """Steps from row to row add up to an eighth; thinning takes up to a fifth, and half of a diagonal."""
+    """Every cell a line passes through, so the strip is up to half a cell longer at both ends."""
     end = np.array([3.0 * np.cos(angle), 5.0 + 3.0 * np.sin(angle)])
     errors = evaluate_glass_cells(line((0, 5), end), [], resolution=CELL)
-    is_diagonal = abs(angle % (np.pi / 2) - np.pi / 4) < 0.08
-    assert (0.5 if is_diagonal else 0.8) * 3.0 < errors.false_length < 1.125 * 3.0 + CELL
+    assert 0.99 * 3.0 < errors.false_length < 1.07 * 3.0 + 1.5 * CELL
+
+
+@pytest.mark.parametrize("thickness", [1, 2, 3, 5])
+def test_false_glass_on_a_diagonal_is_as_long_as_it_is(thickness):
+    """Thick lines a few degrees off the diagonal, of which thinning would leave as little as the half."""
+    across = np.arange(thickness) * CELL * 2**-0.5 * np.array([[-1.0], [1.0]])
+    for angle in np.deg2rad(np.arange(41.0, 50.0)):
+        ends = [(move, move + 3.0 * np.array([np.cos(angle), np.sin(angle)])) for move in across.T]
+        errors = evaluate_glass_cells(
+            np.concatenate([line(*each) for each in ends]), [PANE + 50.0], resolution=CELL
+        )
+        assert errors.false_length == pytest.approx(3.0, rel=0.07, abs=0.1)

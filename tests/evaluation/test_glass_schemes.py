@@ -1,11 +1,11 @@
 """tools/glass_schemes.py."""
 
-import importlib.util
 import json
 import math
 import sys
 from pathlib import Path
 
+import glass_schemes as tool
 import numpy as np
 import pytest
 from rich.console import Console
@@ -16,17 +16,7 @@ from glassslam.geometry import compose, inverse
 from glassslam.outputs import write_tum
 from glassslam.records import Trajectory
 
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "glass_schemes.py"
 PANE = np.array([[[0.0, 0.0], [2.0, 0.0]]])
-
-
-@pytest.fixture(scope="module")
-def tool():
-    spec = importlib.util.spec_from_file_location("glass_schemes", TOOL)
-    module = sys.modules["glass_schemes"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["glass_schemes"]
 
 
 def errors(share, false=0):
@@ -45,7 +35,7 @@ def printed(table):
     return [" ".join(line.replace("│", " ").split()) for line in capture.get().splitlines()]
 
 
-def test_the_table_has_a_row_for_every_building_and_drift_and_a_column_for_every_scheme(tool):
+def test_the_table_has_a_row_for_every_building_and_drift_and_a_column_for_every_scheme():
     runs = [
         tool.Run("a", "lite", False, 50.0, 0.01, errors(0.5)),
         tool.Run("a", "anchored", False, 50.0, 0.01, errors(1.0, false=10)),
@@ -63,12 +53,12 @@ def test_the_table_has_a_row_for_every_building_and_drift_and_a_column_for_every
     assert "b 2.0 no 2.0 = 100.0 % -" in lines
 
 
-def test_the_tolerance_of_the_table_can_be_chosen(tool):
+def test_the_tolerance_of_the_table_can_be_chosen():
     runs = [tool.Run("a", "lite", False, 50.0, 0.01, errors(0.5))]
     assert "within 0.25 m" in printed(tool.build_table(runs, 2))[0]
 
 
-def test_the_map_is_laid_onto_the_truth_by_its_trajectory(tool, tmp_path):
+def test_the_map_is_laid_onto_the_truth_by_its_trajectory(tmp_path):
     """A map whose first pose is turned a little, in a world with a frame of its own."""
     true = np.column_stack((np.arange(9.0) + 3.0, np.sin(np.arange(9.0)), np.full(9, 0.3)))
     world_from_map = np.array([3.0, 1.0, 0.4])
@@ -81,7 +71,7 @@ def test_the_map_is_laid_onto_the_truth_by_its_trajectory(tool, tmp_path):
     assert math.isclose(rmse, 0.0, abs_tol=1e-6)
 
 
-def test_a_building_is_a_bag_and_its_truth(tool, tmp_path):
+def test_a_building_is_a_bag_and_its_truth(tmp_path):
     (tmp_path / "a.bag.truth.json").write_text(json.dumps({"opaque_m": 12.5}))
     beside = tool.building(str(tmp_path / "a.bag"))
     assert (beside.name, beside.opaque) == ("a", 12.5)
@@ -90,7 +80,7 @@ def test_a_building_is_a_bag_and_its_truth(tool, tmp_path):
     assert (other.bag, other.truth, other.opaque) == (Path("b.bag"), Path("panes.geojson"), None)
 
 
-def test_every_scheme_is_run_with_and_without_drift(tool, tmp_path, monkeypatch, capsys):
+def test_every_scheme_is_run_with_and_without_drift(tmp_path, monkeypatch, capsys):
     asked = []
 
     def run(of, scheme, config, *, drift):
@@ -113,7 +103,7 @@ def test_every_scheme_is_run_with_and_without_drift(tool, tmp_path, monkeypatch,
     assert rows[0]["errors"]["within"][0]["found_percent"] == 100.0
 
 
-def test_a_recording_that_fails_is_told_in_one_line(tool, monkeypatch, capsys):
+def test_a_recording_that_fails_is_told_in_one_line(monkeypatch, capsys):
     def run(*_, **__):
         raise RecordingError("cannot read x.bag")
 

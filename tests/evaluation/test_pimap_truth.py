@@ -1,33 +1,15 @@
 """The true map of scene 4 of pi-map that we measured."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+import pimap_bow as bow
+import pimap_truth as tool
 import pytest
 
 from glassslam.evaluation import evaluate_image, read_glass_cells, read_map
 from glassslam.outputs import write_map
 from glassslam.yamlmodel import load_yaml_model
-
-ROOT = Path(__file__).resolve().parents[2]
-# the programs import their neighbours
-sys.path.append(str(ROOT / "tools"))
-
-
-def load(name):
-    path = ROOT / "tools" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-bow = load("pimap_bow")
-tool = load("pimap_truth")
 
 
 @pytest.fixture(scope="module")

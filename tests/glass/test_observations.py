@@ -14,14 +14,14 @@ from glassslam.glass.observations import GlassObservations
 metres = st.floats(-50.0, 50.0)
 angles = st.floats(-math.pi, 3.0)
 poses = arrays(np.float64, (3, 3), elements=angles)
-rows = st.lists(st.tuples(st.integers(0, 2), metres, metres, angles, metres, metres), min_size=1, max_size=8)
+rows = st.lists(st.tuples(st.integers(0, 2), metres, metres, angles), min_size=1, max_size=8)
 
 
 def observations(entries):
-    table = np.array(entries, dtype=np.float64).reshape(-1, 6)
-    one = np.ones(len(table))
+    table = np.array(entries, dtype=np.float64).reshape(-1, 4)
+    one, sensor = np.ones(len(table)), np.zeros((len(table), 2))
     node = table[:, 0].astype(np.int64)
-    return GlassObservations(node, table[:, 1:3], table[:, 3], table[:, 4:6], one, one, one, one, one, one)
+    return GlassObservations(node, table[:, 1:3], table[:, 3], sensor, one, one, one, one, one, one)
 
 
 def close_angles(a, b):
@@ -32,12 +32,10 @@ def close_angles(a, b):
 def test_every_observation_is_where_its_node_puts_it(entries, node_poses):
     seen = observations(entries)
     positions, normals = seen.at(node_poses)
-    for k, (node, x, y, normal, sx, sy) in enumerate(entries):
+    for k, (node, x, y, normal) in enumerate(entries):
         expected = compose(node_poses[node], np.array([x, y, normal]))
         assert positions[k] == pytest.approx(expected[:2], abs=1e-9)
         assert close_angles(normals[k], expected[2])
-        sensor = compose(node_poses[node], np.array([sx, sy, 0.0]))
-        assert seen.sensors_at(node_poses)[k] == pytest.approx(sensor[:2], abs=1e-9)
 
 
 @given(rows, poses, arrays(np.float64, 3, elements=angles))
@@ -51,7 +49,7 @@ def test_moving_all_nodes_moves_all_observations(entries, node_poses, motion):
 
 
 def test_only_the_observations_of_a_moved_node_move():
-    seen = observations([(0, 1.0, 0.0, 0.0, 0, 0), (1, 1.0, 0.0, 0.0, 0, 0)])
+    seen = observations([(0, 1.0, 0.0, 0.0), (1, 1.0, 0.0, 0.0)])
     positions, normals = seen.at(np.array([[0.0, 0.0, 0.0], [5.0, 2.0, 0.5 * math.pi]]))
     assert positions == pytest.approx(np.array([[1.0, 0.0], [5.0, 3.0]]))
     assert normals == pytest.approx(np.array([0.0, 0.5 * math.pi]))
@@ -63,4 +61,3 @@ def test_no_observations_are_nowhere():
     assert len(none) == 0
     assert positions.shape == (0, 2)
     assert normals.shape == (0,)
-    assert none.sensors_at(np.zeros((0, 3))).shape == (0, 2)

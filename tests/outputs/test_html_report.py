@@ -21,6 +21,7 @@ from glassslam.outputs.html_page import escaped, facts, figures, page
 from glassslam.outputs.html_report import write_html_report
 from glassslam.records import Damage, RecordingInfo, SonarRing
 from glassslam.slam.result import Degeneracy, SonarMaps, StageTime
+from glassslam.sonar.beam_width import BeamWidth
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -81,9 +82,15 @@ def with_glass(result, *walls):
     return replace(result, glass=GlassLayer(walls, GlassObservations.empty(), none, np.empty(0)))
 
 
-def with_sonar(result):
+def with_sonar(result, width=12.0, readings=1847):
     ring = SonarRing(np.zeros((16, 3)), 0.5, 0.1, 5.0, "pioneer3dx")
-    maps = SonarMaps(321, result.map, result.map, np.ones(result.map.probability.shape, np.uint8))
+    halves = np.radians([5.0, 6.0])
+    cone = BeamWidth(
+        np.radians(width), np.radians(10.0), np.radians(14.0), halves, np.ones(2), readings, -0.007, 0.034
+    )
+    maps = SonarMaps(
+        321, np.radians(18.0), cone, result.map, result.map, np.ones(result.map.probability.shape, np.uint8)
+    )
     info = replace(result.info, sonar_ring=ring, sonar_topics=("/sonar",))
     return replace(result, sonar=maps, info=info)
 
@@ -303,7 +310,20 @@ def test_sonar_is_told(tiny_result, tmp_path):
     assert told["sweeps"] == ["321"]
     assert told["sonar map"] == ["BFA, poses FGfit"]
     assert told["joined by"] == [tiny_result.config.sonar.fusion.method]
+    assert told["cone"] == ["18 deg"]
+    assert told["cone as measured"] == ["12 deg (10 to 14), from 1847 readings"]
+    assert told["ranges"] == ["-0.7 cm of the lidar's, spread 3.4 cm"]
     assert (told["sonar topic"], told["sonar ring"]) == (["/sonar"], ["pioneer3dx: 16 sonars"])
+
+
+def test_a_cone_that_could_not_be_measured(tiny_result, tmp_path):
+    result = with_sonar(tiny_result, np.nan, 12)
+    assert build_report(result)["sonar"]["cone"] == {
+        "used_deg": pytest.approx(18.0), "measured_deg": None, "between_deg": None, "readings": 12,
+        "bias_m": None, "spread_m": None,
+    }  # fmt: skip
+    told = Page(html(result, tmp_path)).facts()
+    assert told["cone as measured"] == ["not known: the map explains 12 readings only"]
 
 
 def test_damage_and_warnings_come_before_everything_else(tiny_result, tmp_path):

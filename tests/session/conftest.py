@@ -1,7 +1,7 @@
-"""The recording that most tests of sessions map, and the results of a run that nothing stops."""
+"""The recording that most tests of sessions map, and two runs of it: a whole one and an interrupted one."""
 
 import pytest
-from session_worlds import WORDS, results, write_ring
+from session_worlds import WORDS, interrupted, results, write_ring
 
 from glassslam.cli import main
 
@@ -12,7 +12,21 @@ def bag(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def whole(bag, tmp_path_factory):
+def whole_run(bag, tmp_path_factory):
+    """The directory of a run that nothing stops: to be copied, not to be changed."""
     folder = tmp_path_factory.mktemp("whole") / "run"
     assert main(["map", str(bag), "-o", str(folder), *WORDS]) == 0
-    return results(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def whole(whole_run):
+    return results(whole_run)
+
+
+@pytest.fixture(scope="session")
+def partial_run(bag, tmp_path_factory):
+    """The working directory of a run that was interrupted: to be copied, not to be changed."""
+    folder = tmp_path_factory.mktemp("partial") / "run"
+    assert interrupted(["map", str(bag), "-o", str(folder), *WORDS], 150) == 130
+    return folder.with_name("run.partial")

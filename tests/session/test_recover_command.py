@@ -5,7 +5,7 @@ import sqlite3
 
 import numpy as np
 import pytest
-from session_worlds import WORDS, assert_same_results, interrupted, results, write_ring
+from session_worlds import assert_same_results
 
 from glassslam.cli import main
 from glassslam.errors import SessionError
@@ -13,31 +13,17 @@ from glassslam.session import SESSION_FILE, Session
 from glassslam.session.salvage import salvage
 
 
-@pytest.fixture(scope="module")
-def home(tmp_path_factory):
-    home = tmp_path_factory.mktemp("recovered")
-    bag = write_ring(home / "ring.bag")
-    assert main(["map", str(bag), "-o", str(home / "whole"), *WORDS]) == 0
-    assert interrupted(["map", str(bag), "-o", str(home / "cut"), *WORDS], 150) == 130
-    return home
-
-
-@pytest.fixture(scope="module")
-def whole(home):
-    return results(home / "whole")
-
-
 @pytest.fixture
-def finished(home, tmp_path):
+def finished(whole_run, tmp_path):
     """A finished run of its own; its session."""
-    shutil.copytree(home / "whole", tmp_path / "run")
+    shutil.copytree(whole_run, tmp_path / "run")
     return tmp_path / "run" / SESSION_FILE
 
 
 @pytest.fixture
-def cut(home, tmp_path):
+def cut(partial_run, tmp_path):
     """An interrupted run of its own; its session."""
-    shutil.copytree(home / "cut.partial", tmp_path / "run.partial")
+    shutil.copytree(partial_run, tmp_path / "run.partial")
     return tmp_path / "run.partial" / SESSION_FILE
 
 

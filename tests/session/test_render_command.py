@@ -108,7 +108,10 @@ def test_a_map_beyond_all_memory_leaves_everything_as_it_was(run, capsys):
 def test_a_map_too_large_to_draw_keeps_its_poses(home, tmp_path, capsys):
     target, huge = tmp_path / "run", ["--set", "map.resolution=0.00001"]
     assert main(["map", str(home / "ring.bag"), "-o", str(target), *PLAIN, *huge]) == 1
-    assert f"poses are kept: glassslam render {target} --set ..." in capsys.readouterr().err
+    told = f"poses are kept: glassslam render {target} --set ..."
+    assert told in capsys.readouterr().err
+    assert main(["map", "--resume", str(target), "-q"]) == 1
+    assert told in capsys.readouterr().err
     assert main(["render", str(target), "--set", "map.resolution=0.05", "-q"]) == 0
     assert_same_results(target, results(home / "run"))
 

@@ -4,7 +4,7 @@ import shutil
 import sqlite3
 
 import pytest
-from session_worlds import WORDS, assert_same_results, interrupted, results, rows_of, write_ring
+from session_worlds import WORDS, assert_same_results, interrupted, rows_of
 
 from glassslam.cli import main
 from glassslam.errors import SessionError
@@ -12,21 +12,14 @@ from glassslam.session import Session, is_session, schema
 
 
 @pytest.fixture(scope="module")
-def waiting(tmp_path_factory):
+def waiting(bag, tmp_path_factory):
     """A directory in which a run into `run` waits to be gone on with, every row in the one file."""
     home = tmp_path_factory.mktemp("waiting")
-    interrupted(["map", str(write_ring(home / "ring.bag")), "-o", str(home / "run"), *WORDS], after=40)
+    interrupted(["map", str(bag), "-o", str(home / "run"), *WORDS], after=40)
     with Session.open(home / "run.partial" / "session.db"):
         pass
     assert not (home / "run.partial" / "session.db-wal").exists()
     return home
-
-
-@pytest.fixture(scope="module")
-def whole(waiting):
-    """What the run gives when nothing stops it."""
-    assert main(["map", str(waiting / "ring.bag"), "-o", str(waiting / "whole"), *WORDS]) == 0
-    return results(waiting / "whole")
 
 
 @pytest.fixture

@@ -4,31 +4,16 @@ import shutil
 from importlib import metadata
 
 import pytest
-from session_worlds import WORDS, assert_same_results, interrupted, results, start, write_ring
+from session_worlds import WORDS, assert_same_results, interrupted, results, start
 
 from glassslam.cli import main
 from glassslam.outputs.lock import locked
 
 
-@pytest.fixture(scope="module")
-def home(tmp_path_factory):
-    """The recording, the results of a run that nothing stops, and a run that was interrupted."""
-    home = tmp_path_factory.mktemp("home")
-    bag = write_ring(home / "ring.bag")
-    assert main(["map", str(bag), "-o", str(home / "whole"), *WORDS]) == 0
-    assert interrupted(["map", str(bag), "-o", str(home / "run"), *WORDS], 150) == 130
-    return home
-
-
-@pytest.fixture(scope="module")
-def whole(home):
-    return results(home / "whole")
-
-
 @pytest.fixture
-def target(home, tmp_path):
+def target(partial_run, tmp_path):
     """The interrupted run in a directory of its own."""
-    shutil.copytree(home / "run.partial", tmp_path / "run.partial")
+    shutil.copytree(partial_run, tmp_path / "run.partial")
     return tmp_path / "run"
 
 
@@ -57,16 +42,16 @@ def test_what_a_partial_map_has_left_is_removed(target, whole):
     assert_same_results(target, whole)
 
 
-def test_a_whole_directory_needs_nothing(home, capsys):
-    before = {path: path.read_bytes() for path in (home / "whole").iterdir()}
-    assert main(["map", "--resume", str(home / "whole")]) == 0
-    assert capsys.readouterr() == (f"{home / 'whole'} is whole: there is nothing to go on with\n", "")
-    assert {path: path.read_bytes() for path in (home / "whole").iterdir()} == before
+def test_a_whole_directory_needs_nothing(whole_run, capsys):
+    before = {path: path.read_bytes() for path in whole_run.iterdir()}
+    assert main(["map", "--resume", str(whole_run)]) == 0
+    assert capsys.readouterr() == (f"{whole_run} is whole: there is nothing to go on with\n", "")
+    assert {path: path.read_bytes() for path in whole_run.iterdir()} == before
 
 
-def test_a_second_map_into_the_same_directory_is_refused(home, target, capsys):
+def test_a_second_map_into_the_same_directory_is_refused(bag, target, capsys):
     before = (target.with_name("run.partial") / "session.db").read_bytes()
-    assert tried(capsys, home / "ring.bag", "-o", target) == (
+    assert tried(capsys, bag, "-o", target) == (
         2,
         f"a run into {target} was interrupted and waits in run.partial "
         f"(go on: glassslam map --resume {target}; or begin anew: --overwrite)",
@@ -74,14 +59,14 @@ def test_a_second_map_into_the_same_directory_is_refused(home, target, capsys):
     assert (target.with_name("run.partial") / "session.db").read_bytes() == before
 
 
-def test_with_overwrite_a_run_begins_anew(home, target, capsys):
-    words = [home / "ring.bag", "-o", target, "--overwrite", "--every", "3"]
+def test_with_overwrite_a_run_begins_anew(bag, target, capsys):
+    words = [bag, "-o", target, "--overwrite", "--every", "3"]
     assert tried(capsys, *words) == (0, "")
     assert (target / "session.db").exists()
     assert not target.with_name("run.partial").exists()
 
 
-def test_a_working_directory_without_a_session_is_no_hindrance(home, target, whole):
+def test_a_working_directory_without_a_session_is_no_hindrance(bag, target, whole):
     """A run that was killed before its session was there is begun once more by the same command."""
     partial = target.with_name("run.partial")
     for path in partial.iterdir():
@@ -90,31 +75,31 @@ def test_a_working_directory_without_a_session_is_no_hindrance(home, target, who
         partial.mkdir(exist_ok=True)
         if content is not None:
             (partial / "session.db").write_bytes(content)
-        assert main(["map", str(home / "ring.bag"), "-o", str(target), *WORDS]) == 0
+        assert main(["map", str(bag), "-o", str(target), *WORDS]) == 0
         assert_same_results(target, whole)
         shutil.rmtree(target)
 
 
-def test_a_working_directory_with_something_else_is_left_alone(home, target, capsys):
+def test_a_working_directory_with_something_else_is_left_alone(bag, target, capsys):
     partial = target.with_name("run.partial")
     shutil.rmtree(partial)
     (partial / "notes").mkdir(parents=True)
-    assert tried(capsys, home / "ring.bag", "-o", target) == (
+    assert tried(capsys, bag, "-o", target) == (
         1, f"{partial} holds what is no result: notes (choose another directory)",
     )  # fmt: skip
     assert (partial / "notes").is_dir()
 
 
 @pytest.fixture
-def own_recording(home, tmp_path):
+def own_recording(bag, tmp_path):
     """An interrupted run with a recording that may be moved or changed."""
-    bag = tmp_path / "in" / "ring.bag"
-    bag.parent.mkdir()
-    shutil.copyfile(home / "ring.bag", bag)
-    words = ["map", str(bag), "-o", str(tmp_path / "run"), *WORDS]
+    own = tmp_path / "in" / "ring.bag"
+    own.parent.mkdir()
+    shutil.copyfile(bag, own)
+    words = ["map", str(own), "-o", str(tmp_path / "run"), *WORDS]
     assert interrupted(words, 150) == 130
-    assert main(["map", str(bag), "-o", str(tmp_path / "whole"), *WORDS]) == 0
-    return bag
+    assert main(["map", str(own), "-o", str(tmp_path / "whole"), *WORDS]) == 0
+    return own
 
 
 def test_a_recording_that_has_moved_is_named_before_resume(own_recording, tmp_path, capsys):
@@ -150,16 +135,16 @@ def test_a_recording_that_has_changed_is_refused(own_recording, tmp_path, capsys
     assert (tmp_path / "run.partial" / "session.db").exists()
 
 
-def test_more_recordings_than_the_run_has_read(home, target, capsys):
-    assert tried(capsys, home / "ring.bag", home / "ring.bag", "--resume", target) == (
+def test_more_recordings_than_the_run_has_read(bag, target, capsys):
+    assert tried(capsys, bag, bag, "--resume", target) == (
         1, "the run reads 1 recordings, not 2 (name all, in their order)",
     )  # fmt: skip
 
 
-def test_recordings_are_found_from_another_folder(home, tmp_path, monkeypatch, whole):
+def test_recordings_are_found_from_another_folder(bag, tmp_path, monkeypatch, whole):
     """Named relative to where the run began; results tell the name as it was given."""
     (tmp_path / "in").mkdir()
-    shutil.copyfile(home / "ring.bag", tmp_path / "in" / "ring.bag")
+    shutil.copyfile(bag, tmp_path / "in" / "ring.bag")
     monkeypatch.chdir(tmp_path)
     assert interrupted(["map", "in/ring.bag", "-o", "run", *WORDS], 150) == 130
     assert main(["map", "in/ring.bag", "-o", "other", *WORDS]) == 0

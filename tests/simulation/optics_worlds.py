@@ -1,16 +1,19 @@
 """Worlds of a few surfaces, and beams sent at them from chosen ranges and angles."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from glassslam.simulation import lidar
-from glassslam.simulation.echo import NOBODY, Observation, Optics
+from glassslam.simulation.echo import Observation, Optics
 from glassslam.simulation.floorplan import FloorPlan
 from glassslam.simulation.materials import MATERIALS
 from glassslam.simulation.sensors import LidarModel
+from glassslam.simulation.trace_kernels import Legs
 
 SPACING = 40.0
+NOBODY = Legs(np.empty((0, 5)), np.empty(0))
 
 
 def plan_of(*surfaces, lean_deg=0.0) -> FloorPlan:
@@ -52,3 +55,16 @@ def look(plan, sensor, x, y, bearings_deg, *, legs=NOBODY, seed=0, material_tabl
     lasers = np.stack((np.full(bearings.size, x), np.full(bearings.size, y), bearings), axis=1)
     optics = Optics.build(plan, material_table, model_of(sensor, bearings.size))
     return optics.observe(lasers, legs, np.random.default_rng(seed))
+
+
+def first_surface(x, y, dx, dy, beyond, segments) -> tuple[float, int]:
+    """The nearest segment along a ray: each, one after the other, as a 2 x 2 system of equations."""
+    best, hit = math.inf, -1
+    for index, (x0, y0, x1, y1) in enumerate(segments):
+        matrix = np.array([[dx, x0 - x1], [dy, y0 - y1]])
+        if abs(np.linalg.det(matrix)) < 1e-12:
+            continue
+        t, f = np.linalg.solve(matrix, [x0 - x, y0 - y])
+        if 0 <= f <= 1 and beyond < t < best:
+            best, hit = t, index
+    return best, hit

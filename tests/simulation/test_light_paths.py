@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from optics_worlds import plan_of
+from optics_worlds import first_surface, plan_of
 
 from detectors.labels import GHOST, GLASS, NO_RETURN, SOLID
 from glassslam.simulation import lidar
@@ -23,18 +23,6 @@ def empty(n):
         np.empty(n), np.empty(n), np.empty(n, np.uint8), np.empty(n, np.uint8), np.empty(n, np.int32),
         np.empty(n, np.float32),
     )  # fmt: skip
-
-
-def first_surface(x, y, dx, dy, beyond, segments):
-    best, hit = math.inf, -1
-    for index, (x0, y0, x1, y1) in enumerate(segments):
-        matrix = np.array([[dx, x0 - x1], [dy, y0 - y1]])
-        if abs(np.linalg.det(matrix)) < 1e-12:
-            continue
-        t, f = np.linalg.solve(matrix, [x0 - x, y0 - y])
-        if 0 <= f <= 1 and beyond < t < best:
-            best, hit = t, index
-    return best, hit
 
 
 def first_leg(x, y, dx, dy, beyond, circles):

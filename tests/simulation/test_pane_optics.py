@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from optics_worlds import facing, look, many, plan_of
+from optics_worlds import NOBODY, facing, look, many, plan_of
 
 from detectors.labels import GHOST, GLASS, NO_RETURN, SOLID
 from glassslam.simulation import lidar
+from glassslam.simulation.echo import Optics
 from glassslam.simulation.materials import MATERIALS, Material
 
 PANES = many("glass")
@@ -203,8 +204,6 @@ def test_a_triangulating_lidar_reports_the_strongest_echo():
 
 def drive_along(distance, seed=0, panes=19):
     """Returns of a 23 m glass wall as an RPLidar drives along it: counts, places, incidence, offsets."""
-    from glassslam.simulation.echo import NOBODY, Optics
-
     model = lidar("rplidar")
     wall = [("glass", 1.2 * k + 0.03, 0, 1.2 * k + 1.17, 0) for k in range(panes)]
     plan = plan_of(*wall, ("plaster", -10, 2, 35, 2), ("plaster", -10, -3, 35, -3))

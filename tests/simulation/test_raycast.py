@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from optics_worlds import first_surface
 
 from glassslam.simulation.raycast import SegmentGrid, clearance
 
@@ -19,16 +20,7 @@ angle = st.floats(-math.pi, math.pi, allow_nan=False)
 
 
 def naive_cast(x, y, theta, beyond, walls):
-    """Every segment, one after the other, as a 2 x 2 system of equations."""
-    best, hit = math.inf, -1
-    for index, (x0, y0, x1, y1) in enumerate(walls):
-        matrix = np.array([[math.cos(theta), x0 - x1], [math.sin(theta), y0 - y1]])
-        if abs(np.linalg.det(matrix)) < 1e-12:
-            continue
-        t, f = np.linalg.solve(matrix, [x0 - x, y0 - y])
-        if 0 <= f <= 1 and beyond < t < best:
-            best, hit = t, index
-    return best, hit
+    return first_surface(x, y, math.cos(theta), math.sin(theta), beyond, walls)
 
 
 def test_rays_from_the_middle_of_a_room_meet_its_four_walls():

@@ -1,11 +1,8 @@
 """tools/sonar_tour.py: a real run becomes the path and the world of a recording with sonars."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+import sonar_tour as tool
 from rosbags.highlevel import AnyReader
 from tiny_scene import scene
 
@@ -15,17 +12,6 @@ from glassslam.geometry import inverse, transform_points
 from glassslam.outputs import read_tum, write_map, write_tum
 from glassslam.records import Trajectory
 from glassslam.simulation import draw_true_map, simulate
-
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "sonar_tour.py"
-
-
-@pytest.fixture(scope="module")
-def tool():
-    spec = importlib.util.spec_from_file_location("sonar_tour", TOOL)
-    module = sys.modules["sonar_tour"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["sonar_tour"]
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +33,7 @@ def run(tmp_path_factory):
     return folder
 
 
-def test_the_path_is_even_and_smooth_and_turns_the_short_way(tool, run):
+def test_the_path_is_even_and_smooth_and_turns_the_short_way(run):
     motion = tool.motion_of(read_tum(run / "trajectory.tum"), 5.0, 20.0)
     assert np.diff(motion.times) == pytest.approx(np.full(motion.times.size - 1, 0.02))
     assert np.hypot(*(motion.poses[50:-50, :2] - 3.0).T) == pytest.approx(1.5, abs=0.02)
@@ -57,7 +43,7 @@ def test_the_path_is_even_and_smooth_and_turns_the_short_way(tool, run):
         tool.motion_of(read_tum(run / "trajectory.tum"), 5.0, 60.0)
 
 
-def test_jumps_no_robot_makes_are_left_out(tool):
+def test_jumps_no_robot_makes_are_left_out():
     poses = np.zeros((50, 3))
     poses[:, 0] = 0.05 * np.arange(50)
     poses[20, 0] = 40.0
@@ -65,7 +51,7 @@ def test_jumps_no_robot_makes_are_left_out(tool):
     assert motion.poses[:, 0].max() < 2.1
 
 
-def test_the_world_is_the_outline_of_the_map_without_what_stands_on_the_path(tool, draw_map):
+def test_the_world_is_the_outline_of_the_map_without_what_stands_on_the_path(draw_map):
     grid = draw_map(
         """
         ############
@@ -87,19 +73,19 @@ def test_the_world_is_the_outline_of_the_map_without_what_stands_on_the_path(too
 @pytest.mark.parametrize(
     ("sweeps", "together", "period_ms"), [(125, 1, 30.0), (666, 6, 30.0), (200, 2, 37.5)]
 )
-def test_so_many_sonars_fire_together_as_the_sweeps_need(tool, sweeps, together, period_ms):
+def test_so_many_sonars_fire_together_as_the_sweeps_need(sweeps, together, period_ms):
     model = tool.sonars_of(tool.Tour(minutes=1.0, sweeps=sweeps))
     assert model.fired_together == together
     assert 1000 * model.firing_period == pytest.approx(period_ms, abs=0.5)
     assert model.sweep_period == pytest.approx(60.0 / sweeps)
 
 
-def test_sound_is_too_slow_for_some_wishes(tool):
+def test_sound_is_too_slow_for_some_wishes():
     with pytest.raises(UsageError, match=r"a sweep of 0\.006 s is too short for sound"):
         tool.sonars_of(tool.Tour(minutes=1.0, sweeps=10_000))
 
 
-def test_a_tour_is_a_recording_with_laser_odometry_and_sonars(tool, run, tmp_path, capsys):
+def test_a_tour_is_a_recording_with_laser_odometry_and_sonars(run, tmp_path, capsys):
     words = [str(run), "-o", str(tmp_path), "--minutes", "0.4", "--sweeps", "266", "--lidar", "rplidar"]
     assert tool.main(words) == 0
     assert (
@@ -124,7 +110,7 @@ def test_a_tour_is_a_recording_with_laser_odometry_and_sonars(tool, run, tmp_pat
     assert truth.probability[row, column] == 0.0
 
 
-def test_what_cannot_be_toured_is_one_clear_line(tool, run, tmp_path, capsys):
+def test_what_cannot_be_toured_is_one_clear_line(run, tmp_path, capsys):
     assert tool.main([str(run), "-o", str(tmp_path), "--minutes", "3"]) == 2
     assert capsys.readouterr().err.startswith("error: the run lasts 0.5 minutes")
     assert tool.main([str(tmp_path), "-o", str(tmp_path)]) == 1

@@ -163,11 +163,8 @@ def test_observations_follow_their_nodes():
     moved = compose(np.array([1.0, 2.0, 0.3])[None], corridor.node_poses)
     before, after = found.at(corridor.node_poses)[0], found.at(moved)[0]
     assert after == pytest.approx(transform_points(np.array([1.0, 2.0, 0.3]), before))
-    assert found.sensors_at(corridor.node_poses) == pytest.approx(
-        found.at(corridor.node_poses)[0]
-        - WALL_Y * np.column_stack([f(found.at(corridor.node_poses)[1]) for f in (np.cos, np.sin)]),
-        abs=1e-6,
-    )
+    outward = np.column_stack((np.cos(found.normal), np.sin(found.normal)))
+    assert found.sensor == pytest.approx(found.position - WALL_Y * outward, abs=1e-6)
 
 
 def test_without_nodes_or_sweeps_there_is_nothing():

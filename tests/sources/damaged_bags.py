@@ -30,6 +30,15 @@ def read(path, **options):
     return records, recording.damage
 
 
+def count_while_growing(path, rest):
+    """Records of a file to which the rest of it is added as soon as the first one is read."""
+    stream = open_recording(path).records()
+    next(stream)
+    with path.open("ab") as file:
+        file.write(rest)
+    return 1 + sum(1 for _ in stream)
+
+
 def chunk_record(content, claimed, compression=b"none"):
     """A chunk of a ROS1 bag."""
     return ros1_record(

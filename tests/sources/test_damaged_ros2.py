@@ -1,11 +1,12 @@
 """Damaged ROS2 bags: mcap files, databases, and directories with wrong or hostile metadata."""
 
+import re
 import sqlite3
 import struct
 from zlib import crc32
 
 import pytest
-from damaged_bags import DRIVE, WHOLE, read
+from damaged_bags import DRIVE, WHOLE, count_while_growing, read
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from tiny_bags import T0, lone_file, odom, scan, write_ros2
@@ -108,12 +109,7 @@ def test_an_mcap_that_grows_is_read_to_its_size_at_opening(tmp_path, long_mcap):
     end = mcap_chunks(long_mcap)[3].end
     path.write_bytes(long_mcap[:end])
     before, _ = read(path)
-    recording = open_recording(path)
-    stream = recording.records()
-    next(stream)
-    with path.open("ab") as file:
-        file.write(long_mcap[end:])
-    assert 1 + sum(1 for _ in stream) == len(before)
+    assert count_while_growing(path, long_mcap[end:]) == len(before)
     assert len(before) < len(LONG) == len(read(path)[0])
 
 
@@ -278,6 +274,38 @@ def test_metadata_that_are_of_no_use(tmp_path, what, storage):
     with pytest.raises(RecordingError) as caught:
         read(folder, strict=True)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [".inf", "-3", "1e3", "'12'", "null", "[4]", "yes", "7", "9" * 400])
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+@pytest.mark.parametrize("key", ["message_count", "nanoseconds", "nanoseconds_since_epoch"])
+def test_false_numbers_in_metadata(tmp_path, key, number, storage):
+    folder = write_ros2(tmp_path / "run", DRIVE, storage)
+    complete, _ = read(folder)
+    text = (folder / "metadata.yaml").read_text()
+    (folder / "metadata.yaml").write_text(re.sub(rf"\b{key}: \d+", f"{key}: {number}", text))
+    records, damage = read(folder)
+    assert records == complete
+    assert all(part.messages_lost == 0 for part in damage)
+    assert damage or key != "message_count"
+
+
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_messages_that_only_the_metadata_know(tmp_path, storage):
+    folder = write_ros2(tmp_path / "run", DRIVE, storage)
+    complete, _ = read(folder)
+    text = (folder / "metadata.yaml").read_text()
+    (count,) = map(int, re.findall(r"(?m)^  message_count: (\d+)", text))
+    more = text.replace(f"\n  message_count: {count}", f"\n  message_count: {count + 31}")
+    (folder / "metadata.yaml").write_text(more)
+    records, (damage,) = read(folder)
+    assert records == complete
+    assert (damage.messages_lost, damage.reason) == (
+        31,
+        f"it counts other messages than the {count} of its files",
+    )
+    with pytest.raises(RecordingError):
+        read(folder, strict=True)
 
 
 @pytest.mark.parametrize("name", ["../outside.db3", "/etc/passwd", "../../../../etc/passwd"])

@@ -7,7 +7,7 @@ from glassslam.errors import RecordingError, UsageError
 from glassslam.records import LaserScan, PointSet, RangeRing
 from glassslam.sources import SourceOptions, open_recording
 from glassslam.sources.inspection import inspect_recording
-from glassslam.sources.pimap import read_pimap_poses, read_pimap_sonar
+from glassslam.sources.pimap import read_pimap
 from glassslam.sources.sonarfile import open_sonar
 
 TIAGO_RING = """
@@ -59,7 +59,7 @@ def test_ticks_are_the_stamps_of_scan_headers(data_dir):
     """Not the times at which scans were recorded, which are 0.17 s later and jitter."""
     folder = data_dir / "pimap"
     scans = [r for r in open_recording(folder / "scene4.bag").records() if isinstance(r, LaserScan)]
-    ticks = read_pimap_poses(folder / "scene4_pose.txt").stamps
+    ticks = np.unique(read_pimap(folder / "scene4_pose.txt").times)
 
     def lag(times):
         near = np.clip(np.searchsorted(times, ticks), 1, times.size - 1)
@@ -75,7 +75,7 @@ def test_ticks_are_the_stamps_of_scan_headers(data_dir):
 
 def test_sweeps_were_written_at_a_steady_rate(data_dir):
     folder = data_dir / "pimap"
-    times, _ = read_pimap_sonar(folder / "scene4_sonar.txt")
+    times = read_pimap(folder / "scene4_sonar.txt").sweep_times
     np.testing.assert_allclose(np.diff(times), 0.1, atol=1e-5)
     stamps = [r.stamp for r in open_recording(folder / "scene4.bag").records() if isinstance(r, LaserScan)]
     assert stamps[0] < times[0] < times[-1] < stamps[-1]

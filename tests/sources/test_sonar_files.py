@@ -14,7 +14,7 @@ from glassslam.errors import ConfigError, RecordingError, UsageError
 from glassslam.records import LaserScan, Odometry, PointSet, RangeRing
 from glassslam.sources import SourceOptions, open_recording
 from glassslam.sources.inspection import inspect_recording
-from glassslam.sources.pimap import read_pimap_poses, read_pimap_sonar
+from glassslam.sources.pimap import read_pimap
 from glassslam.sources.rings import load_ring
 
 TICKS_AT_1970 = 621355968000000000
@@ -50,9 +50,10 @@ def pimap(tmp_path):
 
 
 def test_ticks_become_seconds_since_1970(pimap):
-    times, ranges = read_pimap_sonar(pimap)
-    assert ranges.shape == (40, 16)
-    assert ranges[0].tolist() == [5.0] * 16
+    log = read_pimap(pimap)
+    times = log.sweep_times
+    assert log.values.shape == (40, 16)
+    assert log.values[0].tolist() == [5.0] * 16
     # a line through ticks that stand still for 0.17 s and are on average half as late
     np.testing.assert_allclose(np.diff(times), 0.1, atol=2e-3)
     assert times[0] == pytest.approx(T0 - 0.085, abs=0.03)
@@ -62,16 +63,16 @@ def test_ticks_that_are_not_steady_stay_as_they_are(tmp_path):
     path = tmp_path / "gap.txt"
     ats = [0.0, 0.1, 0.2, 60.0, 60.1, 60.2]
     path.write_text("\n".join(pimap_line(k, at, [1.0, 2.0, 3.0, 4.0]) for k, at in enumerate(ats)))
-    np.testing.assert_allclose(read_pimap_sonar(path)[0] - T0, ats, atol=1e-6)
+    np.testing.assert_allclose(read_pimap(path).sweep_times - T0, ats, atol=1e-6)
 
 
 def test_poses_of_a_pimap_log(tmp_path):
     rows = [[0.1 * (k // 2), 0.2, 0.3] for k in range(6)]
     path = tmp_path / "scene_pose.txt"
     path.write_text("\n".join(pimap_line(k, 0.17 * (k // 2), row) for k, row in enumerate(rows)))
-    found = read_pimap_poses(path)
-    np.testing.assert_allclose(found.stamps - T0, [0.0, 0.17, 0.34], atol=1e-6)
-    np.testing.assert_allclose(found.poses[:, 0], [0.0, 0.1, 0.2])
+    log = read_pimap(path)
+    np.testing.assert_allclose(log.times - T0, [0.0, 0.0, 0.17, 0.17, 0.34, 0.34], atol=1e-6)
+    assert log.values.tolist() == rows
 
 
 @pytest.mark.parametrize(
@@ -87,17 +88,16 @@ def test_pimap_logs_that_are_none(tmp_path, text, message):
     path = tmp_path / "bad.txt"
     path.write_text(text)
     with pytest.raises(RecordingError, match=message):
-        read_pimap_sonar(path)
+        read_pimap(path)
 
 
 def test_a_cut_off_last_line_is_left_out(pimap):
     pimap.write_text(pimap.read_text()[:-30])
-    assert len(read_pimap_sonar(pimap)[0]) == 39
+    log = read_pimap(pimap)
+    assert (len(log.times), log.dropped) == (39, 1)
 
 
 def test_poses_are_not_ranges(pimap, drive):
-    with pytest.raises(RecordingError, match="holds 16 values a line, not x, y and heading"):
-        read_pimap_poses(pimap)
     pimap.write_text("\n".join(pimap_line(k, k / 10, [1.0, 2.0, 3.0]) for k in range(5)))
     with pytest.raises(RecordingError, match="holds poses, not ranges"):
         open_recording(drive, SourceOptions(sonar=pimap))

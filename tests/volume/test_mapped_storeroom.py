@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from volume_worlds import occupied_share
+from volume_worlds import STOREROOM_EDGES, line, occupied_share
 
 import glassslam as gs
 from glassslam.geometry import inverse, transform_points
@@ -36,22 +36,9 @@ def to_map(bag):
     return lambda points: transform_points(inverse(start), np.asarray(points, dtype=np.float64))
 
 
-def line(start, end):
-    return np.linspace(start, end, 60)
-
-
-EDGES = {
-    "table top": line((3.05, 3.95), (3.95, 3.95)),
-    "shelf": line((0.5, 2.0), (0.5, 3.0)),
-    "lamp": np.array([2.2, 1.3])
-    + 0.2 * np.stack([f(np.linspace(0, 6.28, 40)) for f in (np.cos, np.sin)], axis=1),
-    "pallet": np.concatenate((line((5.45, 2.9), (5.75, 2.9)), line((5.4, 2.95), (5.4, 3.45)))),
-}
-
-
-@pytest.mark.parametrize("thing", EDGES)
+@pytest.mark.parametrize("thing", STOREROOM_EDGES)
 def test_what_hangs_over_the_lidar_or_lies_below_it_is_in_the_map_of_the_volume(result, to_map, thing):
-    made, edge = result[0], to_map(EDGES[thing])
+    made, edge = result[0], to_map(STOREROOM_EDGES[thing])
     assert occupied_share(made.volume.map, edge) >= 0.9
     assert occupied_share(made.map, edge) <= 0.1
 

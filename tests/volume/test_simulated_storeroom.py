@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from volume_worlds import occupied_share
+from volume_worlds import STOREROOM_EDGES, line, occupied_share
 
 from glassslam.geometry import inverse, transform_points
 from glassslam.records import LaserScan, PointSet, Trajectory
@@ -24,26 +24,13 @@ def storeroom():
     return scene, build_volume(records, simulation.truth, options, scene.laser_pose), records, simulation
 
 
-def line(start, end):
-    return np.linspace(start, end, 60)
-
-
-EDGES = {
-    "table top": line((3.05, 3.95), (3.95, 3.95)),
-    "shelf": line((0.5, 2.0), (0.5, 3.0)),
-    "lamp": np.array([2.2, 1.3])
-    + 0.2 * np.stack([f(np.linspace(0, 6.28, 40)) for f in (np.cos, np.sin)], axis=1),
-    "pallet": np.concatenate((line((5.45, 2.9), (5.75, 2.9)), line((5.4, 2.95), (5.4, 3.45)))),
-}
-
-
 @pytest.mark.parametrize(
     ("thing", "share"), [("table top", 0.9), ("shelf", 0.9), ("lamp", 0.9), ("pallet", 0.9)]
 )
 def test_the_fused_map_holds_what_the_lidar_cannot_see(storeroom, thing, share):
     _, volume, _, _ = storeroom
-    assert occupied_share(project(volume.fused, BAND), EDGES[thing]) >= share
-    assert occupied_share(project(volume.lidar, BAND), EDGES[thing]) <= 0.1
+    assert occupied_share(project(volume.fused, BAND), STOREROOM_EDGES[thing]) >= share
+    assert occupied_share(project(volume.lidar, BAND), STOREROOM_EDGES[thing]) <= 0.1
 
 
 @pytest.mark.parametrize(
@@ -53,8 +40,8 @@ def test_things_are_found_at_their_height(storeroom, thing, low, high):
     _, volume, _, _ = storeroom
     at_height = project(volume.fused, (low, high))
     elsewhere = project(volume.fused, (1.65, 2.0) if thing == "lamp" else (1.0, 1.1))
-    assert occupied_share(at_height, EDGES[thing]) >= 0.6
-    assert occupied_share(elsewhere, EDGES[thing]) <= 0.2
+    assert occupied_share(at_height, STOREROOM_EDGES[thing]) >= 0.6
+    assert occupied_share(elsewhere, STOREROOM_EDGES[thing]) <= 0.2
 
 
 def test_the_glass_front_is_in_the_fused_map_where_the_lidar_sees_through(storeroom):

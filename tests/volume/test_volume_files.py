@@ -13,8 +13,8 @@ from glassslam.errors import OutputError, UsageError
 from glassslam.volume import pictures
 from glassslam.volume.colours import height_colours
 from glassslam.volume.files import VOLUME_FILES, check_folder, write_volume
-from glassslam.volume.octomap_file import most_likely, read_octomap, write_octomap
-from glassslam.volume.octomap_kernels import read_nodes, write_nodes
+from glassslam.volume.octomap_file import most_likely, write_octomap
+from glassslam.volume.octomap_kernels import write_nodes
 from glassslam.volume.octree import CENTRE, Leaves, Octree, encode
 from glassslam.volume.odds import Clamp
 from glassslam.volume.pictures import slice_bands, write_slices, write_top_view
@@ -129,18 +129,19 @@ def naive_binary(leaves, threshold):
     return write(0, 0)
 
 
+def payload(path):
+    """What follows the header."""
+    return path.read_bytes().partition(b"\ndata\n")[2]
+
+
 @given(trees)
 def test_an_octomap_file_holds_what_is_likely(tmp_path_factory, pairs):
     tree, path = grown(pairs), tmp_path_factory.mktemp("bt") / "volume.bt"
-    again = read_octomap(write_octomap(tree, path))
     likely = most_likely(tree)
-    assert listed(again.leaves()) == listed(likely.leaves())
-    assert again.resolution == tree.resolution
-    voxels, seen = tree.leaves().voxels(), again.leaves().voxels()
-    assert seen.codes.tolist() == voxels.codes.tolist()
-    assert ((seen.log_odds > 0) == (voxels.log_odds >= 0)).all()
-    payload = path.read_bytes().partition(b"\ndata\n")[2]
-    assert payload == naive_binary(listed(likely.leaves()), 0.0)
+    voxels, decided = tree.leaves().voxels(), likely.leaves().voxels()
+    assert decided.codes.tolist() == voxels.codes.tolist()
+    assert ((decided.log_odds > 0) == (voxels.log_odds >= 0)).all()
+    assert payload(write_octomap(tree, path)) == naive_binary(listed(likely.leaves()), 0.0)
 
 
 def test_the_header_is_that_of_octomap(lamp, tmp_path):
@@ -150,21 +151,18 @@ def test_the_header_is_that_of_octomap(lamp, tmp_path):
     assert lines[2:6] == [b"id OcTree", b"size %d" % nodes, b"res 0.1", b"data"]
 
 
-def test_a_file_of_octomap_itself_is_read(tmp_path):
-    # one occupied voxel at the origin: a path of 15 inner nodes in the seventh octant, then the first child
+def test_one_voxel_is_written_as_octomap_itself_writes_it(tmp_path):
+    tree = grown([((CENTRE, CENTRE, CENTRE), 9.0)], 0.1)
+    # a voxel at the origin: a path of 15 inner nodes, the first in the last octant, then the first child
     chain = (3 << 14).to_bytes(2, "little") + (3).to_bytes(2, "little") * 14 + (2).to_bytes(2, "little")
-    path = tmp_path / "octomap.bt"
-    path.write_bytes(
-        b"# Octomap OcTree binary file\n# comments may be changed\n#\nid OcTree\nsize 17\nres 0.1\ndata\n"
-        + chain
-    )
-    tree = read_octomap(path)
-    assert tree.centres(tree.occupied()).tolist() == [pytest.approx([0.05, 0.05, 0.05])]
+    path = write_octomap(tree, tmp_path / "volume.bt")
+    assert b"\nsize 17\n" in path.read_bytes()
+    assert payload(path) == chain
 
 
 def test_an_empty_volume_is_an_octomap_file_without_nodes(tmp_path):
-    tree = read_octomap(write_octomap(Octree(0.2), tmp_path / "empty.bt"))
-    assert (tree.count(), tree.resolution) == ((0, 0), 0.2)
+    content = write_octomap(Octree(0.2), tmp_path / "empty.bt").read_bytes()
+    assert content.endswith(b"\nid OcTree\nsize 0\nres 0.2\ndata\n")
 
 
 def test_a_volume_of_one_leaf_has_no_octomap_file(tmp_path):
@@ -173,57 +171,13 @@ def test_a_volume_of_one_leaf_has_no_octomap_file(tmp_path):
         write_octomap(Octree.from_leaves(whole, 0.1), tmp_path / "volume.bt")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (b"# Octomap OcTree binary file", b"# Octomap OcTree file", "is no binary OctoMap file"),
-        (b"id OcTree", b"id ColorOcTree", "holds a tree of kind 'ColorOcTree'"),
-        (b"\ndata\n", b"\n", "holds a tree of kind 'OcTree'"),
-        (b"res 0.1", b"res wide", "size or resolution is missing or no number"),
-        (b"size ", b"size 1", "nodes, its header says"),
-    ],
-)
-def test_a_foreign_octomap_file_is_refused(lamp, tmp_path, old, new, words):
-    path = write_octomap(lamp, tmp_path / "volume.bt")
-    content = path.read_bytes()
-    assert old in content
-    path.write_bytes(content.replace(old, new, 1))
-    with pytest.raises(OutputError, match=words):
-        read_octomap(path)
-
-
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [(b"\xff\xff\x00", "ends in the middle of the tree"), (b"\x03\x00" * 20, "has nodes below level 16")],
-)
-def test_a_damaged_octomap_file_is_refused(tmp_path, data, words):
-    path = tmp_path / "volume.bt"
-    path.write_bytes(b"# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n" + data)
-    with pytest.raises(OutputError, match=words) as error:
-        read_octomap(path)
-    assert error.value.hint == "the file is damaged"
-
-
-def test_a_missing_octomap_file_is_refused(tmp_path):
-    with pytest.raises(OutputError, match=r"cannot read .*none.bt: No such file or directory"):
-        read_octomap(tmp_path / "none.bt")
-
-
 @given(trees)
-def test_the_binary_kernels_undo_each_other(pairs):
+def test_the_binary_kernel_is_its_naive_twin(pairs):
     tree = grown(pairs)
-    leaves = tree.leaves()
-    data = np.frombuffer(tree.binary(), dtype=np.uint8)
-    codes, depths = np.empty(4 * data.size, np.int64), np.empty(4 * data.size, np.uint8)
-    occupied = np.empty(4 * data.size, np.bool_)
-    read, count = read_nodes(data, codes, depths, occupied)
-    assert (read, count) == (data.size, len(leaves))
-    found = sorted(
-        zip(codes[:count].tolist(), depths[:count].tolist(), occupied[:count].tolist(), strict=True)
-    )
-    assert found == [(c, d, v >= 0.0) for c, d, v in listed(leaves)]
-    out = np.empty(data.size, np.uint8)
-    assert write_nodes(tree._first_child, tree._log_odds, 0.0, out) == data.size
+    expected = naive_binary(listed(tree.leaves()), 0.0)
+    out = np.empty(len(expected), np.uint8)
+    assert write_nodes(tree._first_child, tree._log_odds, 0.0, out) == len(expected)
+    assert out.tobytes() == expected == tree.binary()
 
 
 def test_a_ply_file_holds_every_occupied_voxel(tmp_path):

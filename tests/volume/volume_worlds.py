@@ -99,3 +99,18 @@ def occupied_share(grid, points):
     column, row = np.floor((np.asarray(points) - grid.origin) / grid.resolution).astype(int).T
     inside = (row >= 0) & (row < filled.shape[0]) & (column >= 0) & (column < filled.shape[1])
     return (grown[row.clip(0, filled.shape[0] - 1), column.clip(0, filled.shape[1] - 1)] & inside).mean()
+
+
+def line(start, end):
+    """Points (60, 2) from one end to the other."""
+    return np.linspace(start, end, 60)
+
+
+STOREROOM_EDGES = {
+    "table top": line((3.05, 3.95), (3.95, 3.95)),
+    "shelf": line((0.5, 2.0), (0.5, 3.0)),
+    "lamp": np.array([2.2, 1.3])
+    + 0.2 * np.stack([f(np.linspace(0, 6.28, 40)) for f in (np.cos, np.sin)], axis=1),
+    "pallet": np.concatenate((line((5.45, 2.9), (5.75, 2.9)), line((5.4, 2.95), (5.4, 3.45)))),
+}
+"""Edges of what the lidar passes over or under in the shipped storeroom, world frame, m."""
