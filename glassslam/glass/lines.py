@@ -1,12 +1,14 @@
 """Straight lines through oriented surface pieces."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.records import FloatArray
+
+_NODES_TOGETHER = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +86,50 @@ def fit_line(
     information = spread + 1.0 / normal_variance
     angle = by_normals + spread / information * math.atan(slope)
     return Line(foot, angle, 1.0 / math.sqrt(float(weights.sum())), 1.0 / math.sqrt(information))
+
+
+def with_scatter(
+    line: Line,
+    positions: FloatArray,
+    normals: FloatArray,
+    position_sigma: FloatArray,
+    normal_sigma: FloatArray,
+    nodes: NDArray[np.int64],
+) -> Line:
+    """The line with the uncertainty that the scatter of its pieces tells.
+
+    What one node sees, and what its neighbours see from nearly the same place with nearly the same error of
+    their poses, errs in one way: ten nodes in a row are one witness. The deviations of the witnesses give the
+    covariance of the least squares (the sandwich estimator, grouped by witness); it is never below what as
+    many independent pieces would have. Errors that all nodes share are not in it.
+
+    Parameters
+    ----------
+    line : Line
+        As fitted to the pieces.
+    positions, normals, position_sigma, normal_sigma : ndarray
+        The pieces, as in `fit_line`.
+    nodes : ndarray of int64, shape (n,)
+        The node that saw each piece.
+    """
+    by_position, by_normal = 1.0 / position_sigma**2, 1.0 / normal_sigma**2
+    along, gaps = line.along(positions), line.gap(positions)
+    turns = (normals + 0.5 * np.pi - line.angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    _, witness = np.unique(nodes // _NODES_TOGETHER, return_inverse=True)
+    count = int(witness.max()) + 1
+    pulls = np.stack(
+        (
+            np.bincount(witness, by_position * gaps, count),
+            np.bincount(witness, by_position * gaps * along + by_normal * turns, count),
+        )
+    )
+    lever = float(by_position @ along)
+    information = np.array([[by_position.sum(), lever], [lever, by_position @ along**2 + by_normal.sum()]])
+    inverse = np.linalg.inv(information)
+    scatter = inverse @ (pulls @ pulls.T) @ inverse * (count / max(count - 1, 1))
+    least = inverse * (len(nodes) / count)
+    position, angle = np.sqrt(np.maximum(np.diag(scatter), np.diag(least))).tolist()
+    return replace(line, position_sigma=position, angle_sigma=angle)
 
 
 def _mean_axis(angles: FloatArray, weights: FloatArray) -> tuple[float, float]:

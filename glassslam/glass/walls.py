@@ -16,7 +16,7 @@ from glassslam.config import GlassWallConfig
 from glassslam.glass.beams import BeamEvidence, Beams
 from glassslam.glass.chains import chains, straight_parts
 from glassslam.glass.evidence_kernels import count_along_line
-from glassslam.glass.lines import Line, fit_line, members
+from glassslam.glass.lines import Line, fit_line, members, with_scatter
 from glassslam.glass.observations import LIDAR, SONAR, GlassObservations
 from glassslam.glass.stretches import STEP, LineEvidence, glass_stretches, runs
 from glassslam.glass.withdrawal import withdrawn_pieces
@@ -134,7 +134,10 @@ def _robust_line(
         if len(near) < 2 or np.array_equal(near, kept):
             break
         kept = near
-    return line
+    return with_scatter(
+        line, positions[kept], normals[kept], observations.position_sigma[kept],
+        observations.normal_sigma[kept], observations.node[kept],
+    )  # fmt: skip
 
 
 def _on_line(

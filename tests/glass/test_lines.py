@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glassslam.glass.lines import Line, axial_difference, fit_line, members
+from glassslam.glass.lines import Line, axial_difference, fit_line, members, with_scatter
 
 USELESS = 1e3
 
@@ -120,3 +120,45 @@ def test_a_line_measures_along_and_across_from_its_foot():
     points = np.array([[1.0, 4.0], [-1.0, 1.0]])
     assert line.along(points) == pytest.approx([3.0, 0.0])
     assert line.gap(points) == pytest.approx([0.0, 2.0])
+
+
+def witnessed(seed, witnesses, each, shared, own=0.005):
+    """Pieces of a wall of 6 m seen from `witnesses` places, whose errors they share, and what is stated."""
+    random = np.random.default_rng(seed)
+    nodes = np.repeat(10 * np.arange(witnesses), each) + random.integers(0, 10, witnesses * each)
+    along = np.repeat(random.uniform(-2.5, 2.5, witnesses), each) + random.uniform(-0.5, 0.5, len(nodes))
+    across = np.repeat(random.normal(0.0, shared, witnesses), each) + random.normal(0.0, own, len(nodes))
+    turned = np.repeat(random.normal(0.0, 2.0 * shared, witnesses), each) + random.normal(
+        0.0, own, len(nodes)
+    )
+    positions, normals = pieces(0.3, along, across, turned)
+    sigma = np.full(len(nodes), own)
+    return positions, normals, sigma, sigma, nodes
+
+
+@pytest.mark.parametrize(("shared", "each"), [(0.0, 1), (0.02, 20), (0.1, 5)])
+def test_what_a_witness_sees_counts_once(shared, each):
+    deviations, too_sure = [], []
+    for seed in range(300):
+        seen = witnessed(seed, 12, each, shared)
+        plain = fit_line(*seen[:4])
+        line = with_scatter(plain, *seen)
+        assert (line.angle, line.foot.tolist()) == (plain.angle, plain.foot.tolist())
+        error = (line.angle - 0.3 + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+        across = float(Line(np.array([1.0, 2.0]), 0.3, 0.0, 0.0).gap(line.foot[None])[0])
+        deviations.append((across / line.position_sigma, error / line.angle_sigma))
+        too_sure.append((across / plain.position_sigma, error / plain.angle_sigma))
+    spread = np.sqrt(np.mean(np.square(deviations), axis=0))
+    assert ((spread > 0.75) & (spread < 1.35)).all()
+    if shared:
+        assert (np.sqrt(np.mean(np.square(too_sure), axis=0)) > 4.0).all()
+
+
+@given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 5))
+def test_scatter_is_never_below_that_of_independent_witnesses(seed, witnesses, each):
+    seen = witnessed(seed, witnesses, each, 0.0)
+    plain = fit_line(*seen[:4])
+    line = with_scatter(plain, *seen)
+    independent = 0.999 * math.sqrt(each)  # the line is turned a little from the first direction
+    assert line.position_sigma >= independent * plain.position_sigma
+    assert line.angle_sigma >= independent * plain.angle_sigma
