@@ -17,6 +17,7 @@ from glassslam.outputs.volume_maps import describe_volume
 from glassslam.records import Trajectory
 from glassslam.slam.result import MapResult, RunStatistics
 
+_LEAST_STEP = 0.05
 _REPORTED_PACKAGES = ("glassslam", "numpy", "scipy", "numba", "casadi")
 
 
@@ -62,8 +63,20 @@ def peak_memory_mb() -> float:
 
 
 def distance_travelled(trajectory: Trajectory) -> float:
-    """Length of the path through all poses, in their order, m."""
-    return float(np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T).sum())
+    """Length of the path in steps of 5 cm or more, m: the noise of a robot that stands is no travel.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Poses in their order.
+    """
+    total, last = 0.0, (math.nan, math.nan)
+    for x, y in trajectory.poses[:, :2].tolist():
+        step = math.hypot(x - last[0], y - last[1])
+        if not step < _LEAST_STEP:  # the first one is no number
+            total += 0.0 if math.isnan(step) else step
+            last = x, y
+    return total
 
 
 def real_time_factor(statistics: RunStatistics, wall: float) -> float:

@@ -24,7 +24,8 @@ from glassslam.outputs import (
     staged_directory,
     write_results,
 )
-from glassslam.records import SonarRing
+from glassslam.outputs.report import distance_travelled
+from glassslam.records import SonarRing, Trajectory
 from glassslam.slam.result import Degeneracy
 
 
@@ -212,3 +213,14 @@ def test_the_report_tells_where_a_run_was_uncertain(tiny_result):
         "length_m": 4.5,
         "text": "no scan",
     }
+
+
+def test_the_noise_of_a_standing_robot_is_no_travel():
+    random = np.random.default_rng(0)
+    stands = np.column_stack((random.uniform(-0.02, 0.02, (500, 2)), np.zeros(500)))
+    drives = np.column_stack((np.arange(0.0, 10.0, 0.013), np.zeros((770, 2))))
+    circles = np.linspace(0.0, 2.0 * np.pi, 1000)
+    circle = np.column_stack((2.0 * np.cos(circles), 2.0 * np.sin(circles), circles))
+    for poses, expected in ((stands, 0.0), (drives, 10.0), (circle, 4.0 * np.pi), (drives[:0], 0.0)):
+        track = Trajectory(np.arange(len(poses), dtype=np.float64), poses)
+        assert distance_travelled(track) == pytest.approx(expected, abs=0.06)
