@@ -10,6 +10,7 @@ import threading
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
@@ -47,6 +48,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage or configuration,
 3 done but part of the input was damaged or dropped, 130/143 interrupted.
 """
 
+_HELP = {"help_option_names": ["-h", "--help"]}
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 
 
@@ -83,7 +85,9 @@ def load_command(name: str) -> Any:
     text = re.split(r"\n\n\w+\n-{3,}\n", inspect.getdoc(function) or "")[0]
     examples = getattr(module, "EXAMPLES", "")
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name, help=text, epilog=f"\b\nExamples:\n{examples}" if examples else None)(function)
+    single.command(
+        name, context_settings=_HELP, help=text, epilog=f"\b\nExamples:\n{examples}" if examples else None
+    )(function)
     return typer.main.get_command(single)
 
 
@@ -97,7 +101,7 @@ def _show_version(wanted: bool) -> None:
 
 def build_app() -> Any:
     """Build the command group of the whole program."""
-    app = typer.Typer(cls=LazyGroup, add_completion=False, rich_markup_mode=None)
+    app = typer.Typer(cls=LazyGroup, context_settings=_HELP, add_completion=False, rich_markup_mode=None)
 
     @app.callback(help="Offline 2D lidar SLAM: from a recording to a loop-closed map.", epilog=_EXAMPLES)
     def _root(
@@ -137,10 +141,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    _check_words(words)
     code = build_app().main(args=words, prog_name="glassslam", standalone_mode=False)
     if code == 130:
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
+
+
+def _check_words(words: list[str]) -> None:
+    """An empty path would be the working directory, which nobody means who has mistyped a variable."""
+    for before, word in pairwise(["glassslam", *words]):
+        if not word or re.fullmatch(r"--[\w-]+=", word):
+            raise UsageError(
+                f"an empty argument {f'in {word}' if word else f'after {before}'}",
+                "perhaps a variable of the shell that is not set",
+            )
 
 
 def _catch_sigterm() -> Any:

@@ -47,6 +47,8 @@ def test_every_command_has_help(capsys, name):
     text = capsys.readouterr().out
     assert text.startswith(f"Usage: glassslam {name}")
     assert "Parameters" not in text
+    assert main([name, "-h"]) == 0
+    assert capsys.readouterr().out == text
 
 
 def test_help_loads_nothing_heavy():
