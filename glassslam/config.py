@@ -23,7 +23,9 @@ from glassslam.parameters.slam import (
 )
 from glassslam.parameters.sonar import FusionConfig, ScanFilterConfig, SonarConfig, SonarGlassConfig
 from glassslam.parameters.volume import VolumeConfig
-from glassslam.yamltext import parse_yaml
+from glassslam.regularfile import regular
+from glassslam.yamlmodel import expected
+from glassslam.yamltext import parse_yaml, unreadable
 
 __all__ = [
     "Config",
@@ -72,10 +74,10 @@ class Config(Section):
             The file cannot be read, is no mapping, or holds an unknown or unfit value.
         """
         try:
-            text = Path(path).read_text(encoding="utf-8")
+            text = regular(path).read_text(encoding="utf-8")
             data = parse_yaml(text)
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise ConfigError(f"cannot read configuration {path}: {_first_line(error)}") from error
+            raise ConfigError(f"cannot read configuration {path}: {unreadable(error)}") from error
         return cls.from_mapping({} if data is None else data, origin=str(path))
 
     @classmethod
@@ -99,10 +101,6 @@ class Config(Section):
         return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False)
 
 
-def _first_line(error: BaseException) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
-
-
 def _names(model: type[BaseModel], location: tuple[Any, ...]) -> list[str]:
     for part in location:
         annotation = model.model_fields[part].annotation if part in model.model_fields else None
@@ -112,15 +110,31 @@ def _names(model: type[BaseModel], location: tuple[Any, ...]) -> list[str]:
     return list(model.model_fields)
 
 
+def _suggestion(model: type[BaseModel], location: tuple[Any, ...]) -> str:
+    known, wrong = _names(model, location[:-1]), str(location[-1])
+    elsewhere = _homes(model, wrong)
+    close = elsewhere or difflib.get_close_matches(wrong, known, n=1)
+    return f"did you mean {' or '.join(map(repr, close))}?" if close else f"known here: {', '.join(known)}"
+
+
+def _homes(model: type[BaseModel], name: str, section: str = "") -> list[str]:
+    """Full names of all parameters and sections that are called so, wherever they are."""
+    homes = []
+    for part, field in model.model_fields.items():
+        place, inner = f"{section}{part}", field.annotation
+        if part == name:
+            homes.append(place)
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            homes += _homes(inner, name, f"{place}.")
+    return homes
+
+
 def _explain(model: type[BaseModel], error: ValidationError, origin: str) -> ConfigError:
     first = error.errors()[0]
     location = tuple(first["loc"])
     name = ".".join(str(part) for part in location)
     if first["type"] == "extra_forbidden":
-        known = _names(model, location[:-1])
-        close = difflib.get_close_matches(str(location[-1]), known, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(known)}"
-        return ConfigError(f"{origin}: unknown parameter {name!r}", hint)
+        return ConfigError(f"{origin}: unknown parameter {name!r}", _suggestion(model, location))
     if first["type"] == "value_error":  # raised by our own checks, which quote what they found
         return ConfigError(f"{origin}: {name}: {first['ctx']['error']}")
-    return ConfigError(f"{origin}: {name}: {first['msg']}", f"found {first['input']!r:.60}")
+    return ConfigError(f"{origin}: {name}: {expected(first)}", f"found {first['input']!r:.60}")

@@ -84,14 +84,28 @@ class TestRefused:
                 "did you mean 'loop_closure'?",
             ),
             (
+                {"missing_data_ray_length": 3},
+                "configuration: unknown parameter 'missing_data_ray_length'",
+                "did you mean 'sensor.missing_data_ray_length'?",
+            ),
+            (
+                {"local": {"solver": "lm"}, "loop_closure": {"solver": "lm"}},
+                "configuration: unknown parameter 'loop_closure.solver'",
+                "did you mean 'local.solver' or 'optimization.solver'?",
+            ),
+            (
+                {"fusion": {"method": "walls"}},
+                "configuration: unknown parameter 'fusion'",
+                "did you mean 'sonar.fusion'?",
+            ),
+            (
                 {"motion_filter": {"xyz": 1}},
                 "configuration: unknown parameter 'motion_filter.xyz'",
                 "known here: max_distance, max_angle_deg, max_time",
             ),
             (
                 {"sensor": {"max_range": "far"}},
-                "configuration: sensor.max_range: "
-                "Input should be a valid number, unable to parse string as a number",
+                "configuration: sensor.max_range: expected a number",
                 "found 'far'",
             ),
             (
@@ -111,13 +125,12 @@ class TestRefused:
             ),
             (
                 {"submap": {"num_range_data": 2.5}},
-                "configuration: submap.num_range_data: "
-                "Input should be a valid integer, got a number with a fractional part",
+                "configuration: submap.num_range_data: expected a whole number",
                 "found 2.5",
             ),
             (
                 {"sensor": 3},
-                "configuration: sensor: Input should be a valid dictionary or instance of SensorConfig",
+                "configuration: sensor: expected a mapping of names to values",
                 "found 3",
             ),
         ],
@@ -126,6 +139,22 @@ class TestRefused:
         with pytest.raises(ConfigError) as caught:
             Config.from_mapping(data)
         assert (caught.value.message, caught.value.hint) == (message, hint)
+
+    @pytest.mark.parametrize("section", ["map", "submap", "volume"])
+    @pytest.mark.parametrize("resolution", [1.1, 100.0, 1e300])
+    def test_cells_are_at_most_a_metre(self, section, resolution):
+        message = rf"configuration: {section}\.resolution: Input should be less than or equal to 1"
+        with pytest.raises(ConfigError, match=message):
+            Config.from_mapping({section: {"resolution": resolution}})
+        assert getattr(Config.from_mapping({section: {"resolution": 1.0}}), section).resolution == 1.0
+
+    @pytest.mark.parametrize(("low", "high"), [(10.0, 5.0), (5.0, 5.0), (31.0, None)])
+    def test_limits_that_leave_no_range(self, low, high):
+        limits = {"min_range": low} if high is None else {"min_range": low, "max_range": high}
+        with pytest.raises(ConfigError) as caught:
+            Config.from_mapping({"sensor": limits})
+        text = f"no range lies between min_range {low:g} and max_range {high or 30:g} m"
+        assert caught.value.message == f"configuration: sensor: {text}"
 
     @pytest.mark.parametrize("path", NAMES)
     @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -150,6 +179,21 @@ class TestRefused:
         broken.write_bytes(b"\xff\xfe\x00a")
         with pytest.raises(ConfigError, match=r"cannot read configuration .*broken\.yaml: "):
             Config.load(broken)
+
+    @pytest.mark.parametrize(
+        ("text", "cause"),
+        [
+            (b"map:\n  resolution: [1\n", "line 3: expected ',' or ']', but got '<stream end>'"),
+            (b"map: {}\nglass: a: b\n", "line 2: mapping values are not allowed here"),
+            (b"map: \xff", "it is no text, byte 5 is no UTF-8"),
+        ],
+    )
+    def test_the_place_of_what_is_no_yaml_is_told(self, tmp_path, text, cause):
+        path = tmp_path / "run.yaml"
+        path.write_bytes(text)
+        with pytest.raises(ConfigError) as caught:
+            Config.load(path)
+        assert caught.value.message == f"cannot read configuration {path}: {cause}"
 
     def test_the_file_is_named(self, tmp_path):
         path = tmp_path / "run.yaml"
