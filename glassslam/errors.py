@@ -34,6 +34,10 @@ class RecordingError(GlassSlamError):
     """A recording that cannot be read at all."""
 
 
+class UnreachableRecordingError(RecordingError):
+    """A recording whose disk or connection fails while it is read; it may come back."""
+
+
 class NoScansError(RecordingError):
     """A recording in which no usable laser scan was found."""
 

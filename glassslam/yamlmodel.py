@@ -3,6 +3,7 @@
 import difflib
 import types
 import typing
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -10,9 +11,20 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from glassslam.errors import ConfigError
-from glassslam.yamltext import parse_yaml
+from glassslam.regularfile import regular
+from glassslam.yamltext import parse_yaml, unreadable
 
 _M = TypeVar("_M", bound=BaseModel)
+
+_WORDS = (
+    ("expected a whole number", ("int_parsing", "int_type", "int_from_float", "int_parsing_size")),
+    ("expected a number", ("float_parsing", "float_type")),
+    ("expected true or false", ("bool_parsing", "bool_type")),
+    ("expected a text", ("string_type",)),
+    ("expected a list", ("list_type", "tuple_type")),
+    ("expected a mapping of names to values", ("model_type", "dict_type")),
+)
+_EXPECTED = {kind: text for text, kinds in _WORDS for kind in kinds}
 
 
 def load_yaml_model(path: str | Path, model: type[_M]) -> _M:
@@ -24,10 +36,9 @@ def load_yaml_model(path: str | Path, model: type[_M]) -> _M:
         The file cannot be read, is no mapping, or holds an unknown, missing or unfit value.
     """
     try:
-        data = parse_yaml(Path(path).read_text(encoding="utf-8"))
+        data = parse_yaml(regular(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        cause = error.strerror if isinstance(error, OSError) else str(error).splitlines()[0]
-        raise ConfigError(f"cannot read {path}: {cause}") from error
+        raise ConfigError(f"cannot read {path}: {unreadable(error)}") from error
     return validate_model(data, model, origin=str(path))
 
 
@@ -47,6 +58,12 @@ def validate_model(data: Any, model: type[_M], origin: str) -> _M:
         raise _explain(model, error, origin) from error
 
 
+def expected(problem: Mapping[str, Any]) -> str:
+    """What pydantic expects of a value, in the words of those who write YAML."""
+    message: str = problem["msg"]
+    return _EXPECTED.get(problem["type"], message.removeprefix("Value error, "))
+
+
 def _explain(model: type[BaseModel], error: ValidationError, origin: str) -> ConfigError:
     first = error.errors()[0]
     location = first["loc"]
@@ -56,7 +73,7 @@ def _explain(model: type[BaseModel], error: ValidationError, origin: str) -> Con
         close = difflib.get_close_matches(str(location[-1]), known, n=1)
         hint = f"did you mean {close[0]!r}?" if close else f"known here: {', '.join(known)}"
         return ConfigError(f"{origin}: unknown name {place!r}", hint)
-    message = first["msg"].removeprefix("Value error, ")
+    message = expected(first)
     hint = "" if first["type"] in {"missing", "value_error"} else f"found {first['input']!r:.60}"
     return ConfigError(f"{origin}: {place}: {message}" if place else f"{origin}: {message}", hint)
 

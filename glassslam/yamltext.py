@@ -45,6 +45,17 @@ def parse_yaml(text: str) -> Any:
     return data
 
 
+def unreadable(error: BaseException) -> str:
+    """Why a YAML file cannot be read, in one line, with the line at fault where one is."""
+    if isinstance(error, OSError):
+        return error.strerror or type(error).__name__
+    if isinstance(error, UnicodeDecodeError):
+        return f"it is no text, byte {error.start} is no UTF-8"
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"line {error.problem_mark.line + 1}: {error.problem or error.context}"
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
 def _size(data: Any, known: dict[int, int]) -> int:
     """Values that the data has when every alias is written out; 0 in `known` marks what is being counted."""
     if not isinstance(data, dict | list | tuple | set):

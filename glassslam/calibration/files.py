@@ -9,7 +9,8 @@ from glassslam.calibration.result import CalibrationResult
 from glassslam.errors import ConfigError
 from glassslam.outputs.calibration_file import CALIBRATION_FILE, as_yaml
 from glassslam.outputs.directory import staged_directory
-from glassslam.yamltext import parse_yaml
+from glassslam.regularfile import regular
+from glassslam.yamltext import parse_yaml, unreadable
 
 FILES = (CALIBRATION_FILE, "calibration.png")
 """What a calibration directory holds."""
@@ -61,11 +62,13 @@ def read_calibration(path: str | Path) -> Calibration:
     file = Path(path) / FILES[0] if Path(path).is_dir() else Path(path)
     hint = "it is written by glassslam calibrate"
     try:
-        content = parse_yaml(file.read_text(encoding="utf-8"))
+        content = parse_yaml(regular(file).read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"cannot read calibration {file}: {error.strerror}", hint) from error
     except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{file} is no YAML file", f"a calibration is; {hint}") from error
+        raise ConfigError(
+            f"{file} is no YAML file: {unreadable(error)}", f"a calibration is; {hint}"
+        ) from error
     if not isinstance(content, dict) or "diffuse" not in content:
         raise ConfigError(f"{file} is no calibration", hint)
     try:

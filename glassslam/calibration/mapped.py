@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detectors.calibration import Calibration
-from detectors.places import places
 from glassslam.api import ProgressCallback, map_recording
-from glassslam.calibration.reading import Reading, bearings
+from glassslam.calibration.reading import Reading, bearings, places_of
 from glassslam.calibration.views import Plane, View, settled
 from glassslam.config import Config
 from glassslam.errors import CalibrationError
@@ -71,7 +70,7 @@ def mapped_views(
     if align:
         poses = compose(_alignment(reading, result, truth), poses)
     lasers = compose(poses, np.array(reading.info.base_from_laser))
-    numbers = places(scan.ranges for scan in reading.scans)
+    numbers = places_of(reading)
     return [
         View(
             scan,

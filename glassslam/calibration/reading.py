@@ -8,6 +8,7 @@ import numpy as np
 from detectors.beams import FULL_TURN, closes
 from detectors.detection import IntArray
 from detectors.informative import Verdict, is_intensity_informative
+from detectors.places import places
 from glassslam.calibration.session import Session
 from glassslam.errors import CalibrationError, NoScansError
 from glassslam.outputs.calibration_file import recording_day
@@ -122,6 +123,12 @@ def spread(scans: list[LaserScan], most: int) -> list[LaserScan]:
 def bearings(scan: LaserScan) -> FloatArray:
     """Angle of every beam, rad."""
     return scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges), dtype=np.float64)
+
+
+def places_of(reading: Reading) -> IntArray:
+    """Number of the place at which each scan of a recording was taken, from 0 on."""
+    layouts = ((scan.angle_min, scan.angle_increment) for scan in reading.scans)
+    return places((scan.ranges for scan in reading.scans), layouts)
 
 
 def opened(scan: LaserScan, bearing: float) -> LaserScan:

@@ -107,9 +107,10 @@ def make_sessions(
     Raises
     ------
     UsageError
-        A number of values does not fit that of the recordings, or a value is refused.
+        A recording is named twice, a number of values does not fit theirs, or a value is refused.
     """
     count = len(recordings)
+    _check_different(recordings)
     given = zip(
         recordings,
         _spread("--material", materials, count, str),
@@ -119,6 +120,16 @@ def make_sessions(
         strict=True,
     )
     return [_session(*values) for values in given]
+
+
+def _check_different(recordings: Sequence[Path]) -> None:
+    known: set[Path] = set()
+    for path in recordings:
+        if path.resolve() in known:
+            raise UsageError(
+                f"{path} is named twice", "its scans would count twice: name every recording once"
+            )
+        known.add(path.resolve())
 
 
 def _session(

@@ -10,8 +10,7 @@ from detectors.beams import checked_scan, directions
 from detectors.diffuse import DiffuseCurve
 from detectors.pane_lines import fit_line
 from detectors.panes import PaneProfile, find_pane, pane_profile
-from detectors.places import places
-from glassslam.calibration.reading import Reading, bearings, opened
+from glassslam.calibration.reading import Reading, bearings, opened, places_of
 from glassslam.calibration.roi import Roi
 from glassslam.records import LaserScan
 
@@ -91,7 +90,7 @@ def faced_views(reading: Reading, curve: DiffuseCurve) -> list[View]:
         raise ValueError("the session has no stated distance")
     roi = region(reading)
     scans = [opened(scan, roi.centre) for scan in reading.scans]
-    numbers = places(scan.ranges for scan in reading.scans)
+    numbers = places_of(reading)
     return [
         View(scan, _faced(scan, curve, distance, roi), roi.covers(bearings(scan)), int(place))
         for scan, place in zip(scans, numbers, strict=True)
@@ -100,7 +99,7 @@ def faced_views(reading: Reading, curve: DiffuseCurve) -> list[View]:
 
 def plain_views(reading: Reading) -> list[View]:
     """The scans of a session in which no surface is known: none is judged, or all are without glass."""
-    numbers = places(scan.ranges for scan in reading.scans)
+    numbers = places_of(reading)
     clear = reading.session.material == "no-glass"
     return [
         View(scan, (), None if clear else np.zeros(len(scan.ranges), dtype=bool), int(place))

@@ -72,7 +72,9 @@ Name = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("--output", "-o", metavar="DIR", help="Directory to write [default: NAME-calibration]."),
+    typer.Option(
+        "--output", "-o", metavar="DIR", help="Directory to write [default: RECORDING-calibration]."
+    ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier calibration in DIR.")]
 ScanTopic = Annotated[str | None, typer.Option(help="Topic of the laser scans.", metavar="TOPIC")]
@@ -111,7 +113,7 @@ def calibrate_command(
     from glassslam.calibration import FILES, make_sessions, write_calibration  # noqa: PLC0415  (loads numba)
     from glassslam.calibration import calibrate as run  # noqa: PLC0415
     from glassslam.cli.progress import progress_bar  # noqa: PLC0415
-    from glassslam.cli.settings import default_directory  # noqa: PLC0415
+    from glassslam.cli.settings import check_elsewhere, default_directory  # noqa: PLC0415
     from glassslam.errors import UsageError  # noqa: PLC0415
     from glassslam.outputs import check_directory  # noqa: PLC0415
     from glassslam.outputs.lock import locked  # noqa: PLC0415
@@ -123,6 +125,7 @@ def calibrate_command(
     if align and not any(session.panes for session in sessions):
         raise UsageError("--align needs --panes", "a faced pane needs no alignment")
     directory = output or default_directory(recordings, "calibration")
+    check_elsewhere(directory)
     check_directory(directory, overwrite=overwrite, files=FILES)
     options = SourceOptions(scan_topic=scan_topic, start=start, duration=duration)
     with locked(directory):

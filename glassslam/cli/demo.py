@@ -26,11 +26,13 @@ def demo(output: Output = Path("demo_out")) -> int:
     truth, and DIR/map the results, as glassslam map writes them.
     """
     from glassslam.cli.map import map_command  # noqa: PLC0415
+    from glassslam.cli.settings import check_not_root  # noqa: PLC0415  (loads pydantic)
     from glassslam.cli.simulate import describe, record  # noqa: PLC0415
     from glassslam.cli.terminal import emit  # noqa: PLC0415
     from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.simulation import Scene, find_scene, simulate  # noqa: PLC0415  (loads numba)
 
+    check_not_root(output)
     bag, results = output / "demo.bag", output / "map"
     with locked(output):
         _check_own(output, bag)

@@ -149,15 +149,16 @@ def map_command(
     manner = Manner(Stopwatch(), json=json, quiet=quiet)
     if resume is not None:
         refuse_others(
-            output, config, assignments, sensor, calibration, require_intensity, overwrite, scan_topic,
-            odom_topic, imu_topic, sonar, sonar_topic, points_topic, sonar_ring, laser_pose, start, duration,
+            output, config, assignments, sensor, calibration, require_intensity, scan_topic, odom_topic,
+            imu_topic, sonar, sonar_topic, points_topic, sonar_ring, laser_pose, start, duration,
             strict, every != 1, echo != "first",
         )  # fmt: skip
-        return go_on(resume, recordings, manner)
+        return go_on(resume, recordings, manner, overwrite=overwrite)
     if not recordings:
         raise UsageError("no recording is named", "glassslam map RECORDING, or --resume DIR")
     from glassslam.cli.settings import (  # noqa: PLC0415
         calibration_assignments,
+        check_elsewhere,
         check_intensity_use,
         default_directory,
         intensity_assignments,
@@ -167,6 +168,7 @@ def map_command(
     )
 
     directory = output or default_directory(recordings)
+    check_elsewhere(directory)
     check_directory(directory, overwrite=overwrite)
     pose, resolved = (
         parse_pose(laser_pose),

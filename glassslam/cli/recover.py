@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glassslam.cli.workplace import named_target, session_path
+from glassslam.cli.workplace import allow_replacing, check_own, named_target, session_path
 from glassslam.errors import OutputError, SessionError
 
 if TYPE_CHECKING:
@@ -34,10 +34,12 @@ def recover(directory: Directory) -> int:
     """
     from glassslam.cli.terminal import emit  # noqa: PLC0415
     from glassslam.outputs.lock import locked  # noqa: PLC0415
+    from glassslam.session.aside import undo_aside  # noqa: PLC0415
 
     target = named_target(directory)
     with locked(target):
         path = session_path(target)
+        undo_aside(path)
         if _is_sound(path):
             emit(f"{path} is sound: there is nothing to save\n")
             return 0
@@ -59,26 +61,28 @@ def _is_sound(path: Path) -> bool:
     """
     from glassslam.session import Session, is_session  # noqa: PLC0415
     from glassslam.session.database import check_header  # noqa: PLC0415
+    from glassslam.session.salvage import scans_found  # noqa: PLC0415
 
     if is_session(path):
         check_header(path)
     # opening a database may change it, and results that turn out to be sound are left as they are
     with tempfile.TemporaryDirectory(prefix=f".{path.parent.name}.", dir=path.parent.parent) as folder:
-        for ending in ("", "-wal"):
+        for ending in ("", "-wal", "-journal"):
             with suppress(FileNotFoundError):
                 shutil.copyfile(f"{path}{ending}", Path(folder) / f"{path.name}{ending}")
         try:
             with Session.open(Path(folder) / path.name) as session:
                 session.check()
+                return bool(scans_found(path) <= session.journal.scans)
         except SessionError:
             return False
-    return True
 
 
 def _saved(path: Path, target: Path) -> "tuple[Salvage, Path]":
     """Put a new session in the working directory; a damaged one that stood there stays beside it."""
     from glassslam.outputs.directory import working_directory  # noqa: PLC0415
     from glassslam.session import SESSION_FILE  # noqa: PLC0415
+    from glassslam.session.aside import set_aside  # noqa: PLC0415
     from glassslam.session.salvage import salvage  # noqa: PLC0415
 
     folder = working_directory(target)
@@ -86,14 +90,19 @@ def _saved(path: Path, target: Path) -> "tuple[Salvage, Path]":
     fresh = made.with_name(f"{SESSION_FILE}.new")
     try:
         folder.mkdir(exist_ok=True)
+        check_own(folder)
         fresh.unlink(missing_ok=True)
         saved = salvage(path, fresh)
         if path == made:
-            for ending in ("-wal", ""):  # the log first: it must never meet another file
-                old = path.with_name(f"{path.name}{ending}")
-                if old.exists():
-                    old.replace(path.with_name(f"{path.name}.damaged{ending}"))
+            set_aside(path)
         fresh.replace(made)
+        if path != made:  # the damaged results are what the run will replace
+            allow_replacing(folder)
+    except SessionError as error:
+        if path != made or not (target / SESSION_FILE).is_file():
+            raise
+        hint = f"{error.hint}; or remove {folder.name}: what {target} holds stays as it was"
+        raise SessionError(error.message, hint) from error
     except OSError as error:
         raise OutputError(f"cannot write {folder}: {error.strerror}", "free some space") from error
     finally:

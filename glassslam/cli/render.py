@@ -1,6 +1,5 @@
 """`glassslam render`: draw the results of a run again, without SLAM."""
 
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,9 +7,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from glassslam.cli.run import Manner, conclude, explained_end, go_on_with
-from glassslam.cli.workplace import check_room, made_directory, named_target, session_path
-from glassslam.errors import GlassSlamError, InterruptedRunError, OutputError, SessionError, UsageError
+from glassslam.cli.endings import explained_end
+from glassslam.cli.interruption import Terminated
+from glassslam.cli.run import Manner, conclude, go_on_with
+from glassslam.cli.workplace import (
+    check_own,
+    check_room,
+    finished_session_path,
+    is_replacing,
+    made_directory,
+    named_target,
+    remove_own,
+    session_path,
+)
+from glassslam.errors import (
+    GlassSlamError,
+    InterruptedRunError,
+    SessionError,
+    UsageError,
+)
 
 if TYPE_CHECKING:
     from glassslam.config import Config
@@ -78,51 +93,71 @@ def render(
     ]
     target = named_target(directory)
     return _render(
-        session_path(target),
+        session_path(target) if output is None else finished_session_path(target),
+        target,
         output or target,
         lambda config: assigned(config, wishes),
-        overwrite=overwrite or output is None,
+        overwrite=overwrite,
+        in_place=output is None,
         manner=manner,
     )
 
 
 def _render(
-    source: Path, target: Path, change: "Callable[[Config], Config]", *, overwrite: bool, manner: Manner
+    source: Path,
+    origin: Path,
+    target: Path,
+    change: "Callable[[Config], Config]",
+    *,
+    overwrite: bool,
+    in_place: bool,
+    manner: Manner,
 ) -> int:
-    """Draw the results of a session into a directory."""
+    """Draw the results of a session, which belongs to the directory `origin`, into a directory."""
     from glassslam.outputs import check_directory  # noqa: PLC0415
     from glassslam.outputs.directory import restore_results, working_directory  # noqa: PLC0415
     from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.session import SESSION_FILE, Session  # noqa: PLC0415
 
     with locked(target):
-        restore_results(target)
-        check_directory(target, overwrite=overwrite)
         folder = working_directory(target)
+        if source.parent == folder:
+            check_own(folder)
+            replacing = is_replacing(folder, target, overwrite=overwrite)
+        else:
+            replacing = overwrite or in_place
+        restore_results(target)
+        check_directory(target, overwrite=replacing)
         if source.parent != folder:
             check_room(folder, target, overwrite=False)
-            with made_directory(folder):
+            with made_directory(folder, replacing=replacing, copied=True):
                 Session.copy(source, folder / SESSION_FILE)
         with (
-            explained_end(target),
-            _given_up_where_it_fails(source, folder),
+            explained_end(target) if source.parent == folder else _undone(source, folder),
             Session.open(folder / SESSION_FILE) as session,
         ):
+            if not session.is_finished:
+                hint = f"go on: glassslam map --resume {origin}"
+                raise UsageError(f"the run of {origin} is not finished", hint)
             finished = _changed(session, change(session.config), target, manner)
-            return conclude(finished, session, target, overwrite=overwrite, manner=manner)
+            return conclude(finished, session, target, overwrite=replacing, manner=manner)
 
 
 @contextmanager
-def _given_up_where_it_fails(source: Path, folder: Path) -> Iterator[None]:
-    """Remove the copy of a session with which nothing can be done; the session itself is where it was."""
+def _undone(source: Path, folder: Path) -> Iterator[None]:
+    """Remove the copy of a session where it does not become results; the session itself is where it was."""
+    again = "the results are as they were; draw them again"
     try:
         yield
-    except (OutputError, InterruptedRunError):
-        raise
+    except (KeyboardInterrupt, Terminated) as error:
+        remove_own(folder)
+        code = 130 if isinstance(error, KeyboardInterrupt) else 143
+        raise InterruptedRunError("interrupted", again, code) from error
+    except InterruptedRunError as error:
+        remove_own(folder)
+        raise InterruptedRunError("interrupted", again, error.exit_code) from error
     except GlassSlamError as error:
-        if source.parent == folder:
-            raise
-        shutil.rmtree(folder)
+        remove_own(folder)
         if isinstance(error, SessionError):
             message = error.message.replace(str(folder), str(source.parent))
             name = folder.name.removesuffix(".partial")
@@ -135,8 +170,6 @@ def _changed(session: "Session", config: "Config", target: Path, manner: Manner)
     """The finished run of a session with another configuration."""
     from glassslam.session.changes import needs_recording  # noqa: PLC0415
 
-    if not session.is_finished:
-        raise UsageError(f"the run of {target} is not finished", f"go on: glassslam map --resume {target}")
     again = needs_recording(session.config, config)
     if again:
         session.check_recordings()

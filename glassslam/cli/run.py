@@ -1,22 +1,23 @@
 """Carrying out a run: written down in a working directory, interruptible, taken up where it ended."""
 
-import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from glassslam.cli.interruption import Bell, Terminated, stopping
-from glassslam.cli.workplace import check_room, clear_but_session, made_directory, named_target, session_path
-from glassslam.errors import (
-    GlassSlamError,
-    InterruptedRunError,
-    MapSizeError,
-    NoScansError,
-    OutputError,
-    SessionError,
+from glassslam.cli.endings import explained_end, given_up_where_it_fails, way_out_told
+from glassslam.cli.interruption import Bell, stopping
+from glassslam.cli.workplace import (
+    check_apart,
+    check_own,
+    check_room,
+    clear_but_session,
+    is_replacing,
+    made_directory,
+    named_target,
+    session_path,
 )
+from glassslam.errors import InterruptedRunError, NoScansError, OutputError, SessionError
 
 if TYPE_CHECKING:
     from glassslam.config import Config
@@ -61,7 +62,11 @@ def begin(
     InterruptedRunError
         A signal came; the run can be taken up again.
     """
-    from glassslam.outputs.directory import restore_results, working_directory  # noqa: PLC0415
+    from glassslam.outputs.directory import (  # noqa: PLC0415
+        check_directory,
+        restore_results,
+        working_directory,
+    )
     from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.session import SESSION_FILE, Session  # noqa: PLC0415
     from glassslam.sources import open_recording  # noqa: PLC0415  (loads rosbags)
@@ -69,26 +74,21 @@ def begin(
     with locked(target):
         restore_results(target)
         folder = working_directory(target)
+        check_directory(target, overwrite=overwrite)
         check_room(folder, target, overwrite=overwrite)
+        check_apart(folder, (*recordings, options.sonar, options.sonar_ring))
         source = open_recording(recordings, options)
-        with made_directory(folder):
+        with made_directory(folder, replacing=overwrite):
             session = Session.create(folder / SESSION_FILE, recordings, config, options)
-        with explained_end(target), session:
-            try:
-                finished = _slam(source, session, target, manner)
-                with _smaller_map_offered(target):
-                    return conclude(finished, session, target, overwrite=overwrite, manner=manner)
-            except (OutputError, InterruptedRunError):
-                raise
-            except GlassSlamError as error:
-                if isinstance(error, MapSizeError) and session.is_finished:
-                    raise
-                session.abandon()
-                shutil.rmtree(folder)  # it would fail again
-                raise
+        with explained_end(target), session, given_up_where_it_fails(session):
+            finished = _slam(source, session, target, manner)
+            with way_out_told(session, target):
+                return conclude(finished, session, target, overwrite=overwrite, manner=manner)
 
 
-def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -> int:
+def resume(
+    directory: Path, recordings: Sequence[Path] | None, manner: Manner, *, overwrite: bool = False
+) -> int:
     """Go on with a run that did not come to its end; the exit code.
 
     Parameters
@@ -99,15 +99,17 @@ def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -
         Where its recordings are now; where they were when left out.
     manner : Manner
         How to tell of it.
+    overwrite : bool
+        Whether earlier results may be replaced, even if that was not said when the run began.
 
     Raises
     ------
     UsageError
-        There is no such run.
+        There is no such run, or there are results now that were not there when it began.
     SessionError
         Its session or its recordings are not what they were.
     """
-    from glassslam.outputs.directory import restore_results  # noqa: PLC0415
+    from glassslam.outputs.directory import check_directory, restore_results  # noqa: PLC0415
     from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.session import Session  # noqa: PLC0415
 
@@ -117,24 +119,22 @@ def resume(directory: Path, recordings: Sequence[Path] | None, manner: Manner) -
         if path.parent == target.resolve():
             restore_results(target)
             return _already_whole(target, manner)
-        clear_but_session(path.parent)
+        folder = path.parent
+        check_own(folder)
         with explained_end(target), Session.open(path) as session:
+            inputs = (recorded.found() for recorded in session.recordings)
+            others = session.options.sonar, session.options.sonar_ring
+            check_apart(folder, (*(recordings or inputs), *others))
+            replacing = is_replacing(folder, target, overwrite=overwrite)
+            restore_results(target)
+            with way_out_told(session, target):
+                check_directory(target, overwrite=replacing)
+            clear_but_session(folder)
             finished = (
                 session.load() if session.is_finished else go_on_with(session, recordings, target, manner)
             )
-            restore_results(target)
-            with _smaller_map_offered(target):
-                return conclude(finished, session, target, overwrite=True, manner=manner)
-
-
-@contextmanager
-def _smaller_map_offered(target: Path) -> Iterator[None]:
-    """Tell how to draw the poses of a finished run where their map is too large."""
-    try:
-        yield
-    except MapSizeError as error:
-        hint = f"{error.hint}; poses are kept: glassslam render {target} --set ..."
-        raise MapSizeError(error.message, hint) from error
+            with way_out_told(session, target):
+                return conclude(finished, session, target, overwrite=replacing, manner=manner)
 
 
 def conclude(
@@ -148,12 +148,16 @@ def conclude(
         Something cannot be written; the session stays.
     """
     from glassslam.cli.settings import calibration_warnings  # noqa: PLC0415
+    from glassslam.cli.terminal import complain  # noqa: PLC0415
     from glassslam.outputs import build_report, write_results  # noqa: PLC0415
 
     result = finished.result()
     result.statistics.warnings[:0] = calibration_warnings(finished.config)
     written = write_results(result, target, overwrite=overwrite, stopwatch=manner.stopwatch, session=session)
-    return tell(build_report(result, manner.stopwatch.read()), written, target, manner)
+    try:
+        return tell(build_report(result, manner.stopwatch.read()), written, target, manner)
+    except OutputError as error:
+        return complain(error.message, f"the results in {target} are whole", code=3)
 
 
 def tell(report: dict[str, Any], written: Sequence[Path], target: Path, manner: Manner) -> int:
@@ -176,20 +180,6 @@ def is_damaged(report: dict[str, Any]) -> bool:
     return bool(report["damage"] or report["solver_failures"]) or any(
         (*report["scans"]["dropped"].values(), *report["messages_dropped"].values())
     )
-
-
-@contextmanager
-def explained_end(target: Path) -> Iterator[None]:
-    """Tell with every end before the end how to go on."""
-    go_on = f"glassslam map --resume {target}"
-    try:
-        yield
-    except OutputError as error:
-        hint = f"{error.hint}; " if error.hint else ""
-        raise OutputError(error.message, f"{hint}then go on: {go_on}") from error
-    except (KeyboardInterrupt, Terminated) as error:
-        code = 130 if isinstance(error, KeyboardInterrupt) else 143
-        raise InterruptedRunError("interrupted", f"go on: {go_on}", code) from error
 
 
 def go_on_with(

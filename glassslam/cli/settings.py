@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -184,7 +185,7 @@ def parse_pose(text: str | None) -> tuple[float, float, float] | None:
     Raises
     ------
     UsageError
-        The text is not three finite numbers.
+        The text is not three finite numbers, or its angle is more than a turn.
     """
     if text is None:
         return None
@@ -196,7 +197,43 @@ def parse_pose(text: str | None) -> tuple[float, float, float] | None:
         raise UsageError(
             f"--laser-pose {text}: not three numbers x,y,yaw", "in m and rad, like 0.1,0,3.14159"
         )
+    if abs(yaw) > 2.0 * math.pi:
+        raise UsageError(
+            f"--laser-pose {text}: a yaw of {yaw:g} rad is more than a turn",
+            f"{yaw:g} deg is {math.radians(yaw):.4f} rad",
+        )
     return x, y, yaw
+
+
+def check_elsewhere(directory: Path) -> None:
+    """Make sure that results do not take the place of the working directory.
+
+    A finished directory appears by being renamed: the shell would be left standing in one that is gone.
+
+    Raises
+    ------
+    UsageError
+        They would.
+    """
+    check_not_root(directory)
+    with suppress(FileNotFoundError):  # the working directory is gone already
+        if Path.cwd().is_relative_to(directory.resolve()):
+            raise UsageError(
+                f"-o {directory}: results would replace the directory you are in",
+                "choose a directory inside it, like -o results",
+            )
+
+
+def check_not_root(directory: Path) -> None:
+    """Make sure that results have a directory with a name.
+
+    Raises
+    ------
+    UsageError
+        It is the root of all directories.
+    """
+    if not directory.resolve().name:
+        raise UsageError(f"-o {directory}: no place for results", "name a directory, like -o results")
 
 
 def default_directory(recordings: Sequence[Path], kind: str = "map") -> Path:

@@ -65,12 +65,16 @@ def simulate(
     the true glass (BAG.truth.glass.geojson), what every beam met (BAG.truth.labels.npz) and the true map
     (BAG.truth.map.yaml), which evaluate --truth reads.
     """
+    from glassslam.cli.settings import check_not_root  # noqa: PLC0415  (loads pydantic)
     from glassslam.cli.terminal import emit  # noqa: PLC0415
     from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.simulation import Scene, find_scene  # noqa: PLC0415  (loads numba)
     from glassslam.simulation import simulate as prepare  # noqa: PLC0415
 
+    check_not_root(output)
     with locked(output):
+        if output.suffix.lower() != ".bag":
+            raise UsageError(f"-o {output}: a ROS 1 bag is written", "give it a name that ends in .bag")
         if output.exists() and not overwrite:
             raise UsageError(f"{output} exists already", "use --overwrite to replace it")
         simulation = prepare(Scene.load(find_scene(scene)), sensor, seed, rate, sonar)

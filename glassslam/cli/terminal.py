@@ -3,6 +3,8 @@
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from glassslam.errors import OutputError
@@ -26,28 +28,40 @@ def emit(text: str) -> None:
     # Started with a closed descriptor, Python has no stream at all.
     if sys.stdout is None:
         return
-    try:
+    with _output():
         sys.stdout.write(_writable(text, sys.stdout.encoding))
         sys.stdout.flush()
-    except BrokenPipeError:
-        discard_output()
-    except OSError as error:
-        discard_output()
-        raise OutputError(f"cannot write to standard output: {error.strerror}") from error
 
 
 def emit_rich(*parts: "RenderableType") -> None:
-    """Render tables and the like for the width and the colours of standard output, and write them."""
+    """Render tables and the like for the width and the colours of standard output, and write them.
+
+    Raises
+    ------
+    OutputError
+        Standard output cannot be written, as by `emit`.
+    """
     from rich.console import Console  # noqa: PLC0415  (40 ms)
 
     if sys.stdout is None:
         return
     console = Console(markup=False, highlight=False, emoji=False)
-    with console.capture() as capture:
+    with _output(), console.capture() as capture:  # which flushes standard output
         for part in parts:
             # a path or a warning that is cut in two can neither be copied nor searched for
             console.print(part, soft_wrap=isinstance(part, str))
     emit(capture.get())
+
+
+@contextmanager
+def _output() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        discard_output()
+    except OSError as error:
+        discard_output()
+        raise OutputError(f"cannot write to standard output: {error.strerror}") from error
 
 
 def complain(message: str, hint: str = "", *, code: int) -> int:

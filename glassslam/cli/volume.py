@@ -38,7 +38,7 @@ Output = Annotated[
     typer.Option("--output", "-o", metavar="DIR", help="Results directory [default: NAME-volume]."),
 ]
 Resolution = Annotated[
-    float | None, typer.Option(min=0.005, metavar="M", help="Edge of a voxel, m [default: 0.05].")
+    float | None, typer.Option(min=0.005, max=1.0, metavar="M", help="Edge of a voxel, m [default: 0.05].")
 ]
 BandOption = Annotated[
     tuple[float, float] | None,
@@ -97,7 +97,7 @@ def volume(
     the band projected on a 2D map, volume_map.yaml and volume_map.pgm. All parameters are in the section
     volume of the configuration; some have an option of their own.
     """
-    from glassslam.cli.settings import parse_pose, resolve_config  # noqa: PLC0415
+    from glassslam.cli.settings import check_not_root, parse_pose, resolve_config  # noqa: PLC0415
     from glassslam.outputs import read_tum  # noqa: PLC0415  (loads numpy)
     from glassslam.outputs.lock import locked  # noqa: PLC0415
     from glassslam.sources import SourceOptions  # noqa: PLC0415
@@ -107,8 +107,9 @@ def volume(
     wishes = [*_band_assignments(band), *(f"volume.{k}={v}" for k, v in options.items() if v is not None)]
     resolved = resolve_config(config, [*(assignments or ()), *wishes])
     target = output or _default_directory(recording)
+    check_not_root(target)
     check_folder(target, overwrite=overwrite)
-    poses = _standing() if trajectory is None else read_tum(trajectory)
+    poses = None if trajectory is None else read_tum(trajectory)
     source_options = SourceOptions(
         # rings of sonars are of no use here, and may be in the way
         sonar_topic="none" if points_topic else None,
@@ -125,7 +126,7 @@ def volume(
 def _made(
     recording: Path,
     source_options: "SourceOptions",
-    poses: "Trajectory",
+    poses: "Trajectory | None",
     config: Any,
     target: Path,
     *,
@@ -134,16 +135,20 @@ def _made(
 ) -> dict[str, Any]:
     """Read, map and write; what is to be told of it."""
     from glassslam.cli.progress import progress_bar  # noqa: PLC0415
+    from glassslam.cli.standing import Standing  # noqa: PLC0415
     from glassslam.outputs import write_map  # noqa: PLC0415
     from glassslam.volume.files import write_volume  # noqa: PLC0415
+    from glassslam.volume.listener import plane_warnings  # noqa: PLC0415
     from glassslam.volume.mapper import build_volume  # noqa: PLC0415  (loads kernels)
     from glassslam.volume.options import volume_options  # noqa: PLC0415
     from glassslam.volume.projection import project  # noqa: PLC0415
 
     source, records, info, dropped = _records(recording, source_options)
     options = volume_options(config.volume, config.sensor, info.laser_height)
+    robot = Standing()
     with progress_bar(quiet=quiet) as progress:
-        built = build_volume(_followed(records, info, progress), poses, options, info.base_from_laser)
+        followed = robot.watched(_followed(records, info, progress))
+        built = build_volume(followed, poses or _standing(), options, info.base_from_laser)
     _check_seen(built, recording)
     heights = config.volume.band_low, config.volume.band_high
     seen_from_above = project(built.fused, heights, config.volume.projection)
@@ -155,7 +160,15 @@ def _made(
         overwrite=overwrite,
     )
     summary = _summary(built, {**dropped, **built.dropped}, written)
-    return {**summary, "lidar_height": options.lidar_height, "damage": [part.text for part in source.damage]}
+    return {
+        **summary,
+        "lidar_height": options.lidar_height,
+        "damage": [part.text for part in source.damage],
+        "warnings": [
+            *(robot.warnings if poses is None else ()),
+            *(plane_warnings(options.lidar_height, heights) if built.counts["scans"] else ()),
+        ],
+    }
 
 
 def _band_assignments(band: tuple[float, float] | None) -> list[str]:
@@ -273,6 +286,7 @@ def _show(summary: dict[str, Any], as_json: bool) -> None:
         f"{size} m, {summary['occupied_voxels']} occupied voxels of {summary['resolution']:g} m, "
         f"lidar {summary['lidar_height']:g} m above the base, "
         f"{summary['leaves']} leaves, {summary['bytes'] / 1e6:.1f} MB",
+        *(f"warning: {text}" for text in summary["warnings"]),
         *(f"dropped: {count} x {reason}" for reason, count in summary["dropped"].items()),
         *(f"damage: {text}" for text in summary["damage"]),
         *(f"wrote {path}" for path in summary["written"]),

@@ -10,6 +10,7 @@ import numpy as np
 
 from glassslam.errors import EvaluationError
 from glassslam.records import FloatArray
+from glassslam.regularfile import regular
 
 Segments: TypeAlias = FloatArray
 """Start and end points, shape (n, 2, 2), m."""
@@ -91,7 +92,7 @@ def distances(points: FloatArray, segments: Segments) -> FloatArray:
 
 def _read_json(path: str | Path, hint: str = "") -> Any:
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return json.loads(regular(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise EvaluationError(f"cannot read {path}: {error.strerror}", hint) from error
     except (ValueError, RecursionError) as error:

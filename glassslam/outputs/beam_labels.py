@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from detectors.labels import GHOST, GLASS
 from glassslam.errors import GlassSlamError, OutputError
 from glassslam.glass.beam_labels import GlassBeams
+from glassslam.regularfile import regular
 
 _COLUMNS = {"stamps": np.float64, "scan": np.int64, "beam": np.int32, "count": np.int32, "label": np.uint8}
 MOST_BYTES = 2 << 30
@@ -64,7 +65,7 @@ def read_arrays(
         Of that kind: the file cannot be read, is no npz, would fill the memory, or lacks an array.
     """
     try:
-        with Path(path).open("rb") as file:
+        with regular(path).open("rb") as file:
             content = np.load(file, allow_pickle=False)
             known = content.files if isinstance(content, np.lib.npyio.NpzFile) else None
             size = sum(member.file_size for member in content.zip.infolist()) if known else 0

@@ -83,7 +83,7 @@ def check_directory(
     UsageError
         It holds earlier results, which may not be replaced.
     OutputError
-        It is a file, holds foreign files, or lies where nothing can be written.
+        It is a file or a mount point, holds foreign files, or lies where nothing can be written.
     """
     target = Path(directory).resolve()
     if target.exists() and not target.is_dir():
@@ -98,8 +98,25 @@ def check_directory(
         )
     if present and not overwrite:
         raise UsageError(f"{directory} already holds results", "use --overwrite to replace them")
+    if _is_mount(target):  # nothing can be renamed to take its place
+        raise OutputError(f"{directory} is a mount point", "name a folder inside it")
     _check_parent(directory, target)
     return target
+
+
+def _is_mount(target: Path) -> bool:
+    if os.path.ismount(target):
+        return True
+    # a folder that is mounted a second time on the same disk shows only here
+    with suppress(OSError):
+        lines = Path("/proc/self/mountinfo").read_text(errors="surrogateescape").splitlines()
+        return _escaped(str(target)) in {line.split(" ")[4] for line in lines}
+    return False
+
+
+def _escaped(path: str) -> str:
+    """A path as the kernel lists it."""
+    return "".join(f"\\{ord(sign):03o}" if sign in " \t\n\\" else sign for sign in path)
 
 
 def _check_parent(directory: str | Path, target: Path) -> None:
@@ -196,6 +213,12 @@ def restore_results(directory: str | Path) -> None:
         _retired(target).rename(target)
 
 
+def is_being_replaced(directory: str | Path) -> bool:
+    """Whether a run was killed when it had put earlier results aside, before its own took their place."""
+    target = Path(directory).resolve()
+    return _retired(target).is_dir() and not target.exists()
+
+
 def _retired(target: Path) -> Path:
     """Where earlier results are while new ones take their place."""
     return target.with_name(f".{target.name}.replaced")
@@ -212,6 +235,7 @@ def _clear(folder: Path, kept: Set[Path]) -> None:
 
 def _publish(staged: Path, target: Path, retired: Path) -> None:
     if not target.exists():
+        _drop_notes(staged)
         staged.rename(target)
         _flush_names(target.parent)
         shutil.rmtree(retired, ignore_errors=True)
@@ -219,6 +243,7 @@ def _publish(staged: Path, target: Path, retired: Path) -> None:
     shutil.rmtree(retired, ignore_errors=True)
     try:
         target.rename(retired)
+        _drop_notes(staged)
         staged.rename(target)
     except BaseException:
         if retired.exists() and not target.exists():
@@ -228,6 +253,13 @@ def _publish(staged: Path, target: Path, retired: Path) -> None:
         raise
     _flush_names(target.parent)
     shutil.rmtree(retired, ignore_errors=True)
+
+
+def _drop_notes(folder: Path) -> None:
+    """Remove what a run keeps beside its session until its results are whole."""
+    for path in folder.iterdir():
+        if path.name.startswith(tuple(f"{name}." for name in STATE_FILES)):
+            path.unlink()
 
 
 def _flush_names(folder: Path) -> None:

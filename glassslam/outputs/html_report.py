@@ -119,7 +119,9 @@ def _uncertain(report: dict[str, Any]) -> str:
     if (hidden := len(report["degeneracies"]) - _MOST_ROWS) > 0:
         rows.append(("more", f"{hidden}, see report.json"))
     said = "Times from the first scan, places in the map frame, in m." if rows else ""
-    return "\n".join(filter(None, (said and paragraph(said, "faint"), facts(rows), _tracking(report))))
+    tracking = _tracking(report)
+    listed = facts(rows) or (tracking and paragraph("none"))
+    return "\n".join(filter(None, (said and paragraph(said, "faint"), listed, tracking)))
 
 
 def _tracking(report: dict[str, Any]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.errors import OutputError
+from glassslam.regularfile import regular
 
 MOST_PIXELS = 400_000_000
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -45,7 +46,7 @@ def read_image(location: Path, *, colour: bool = False) -> NDArray[np.uint8]:
     import cv2  # noqa: PLC0415  (only pictures need it)
 
     try:
-        data = location.read_bytes()
+        data = regular(location).read_bytes()
     except OSError as error:
         raise OutputError(f"cannot read {location}: {error.strerror}") from error
     sound = _checked(data, location)

@@ -9,13 +9,16 @@ from pathlib import Path
 
 from glassslam.errors import OutputError
 
+_ATTEMPTS = 20
+
 
 @contextmanager
 def locked(directory: str | Path) -> Iterator[None]:
     """Keep other runs out of a directory while the block runs; the end of the process lets them in as well.
 
-    The lock is a hidden file beside the directory, or beside the first of its parents that does not exist
-    yet. On disks that know no locks there is none.
+    The lock is a hidden file beside the directory. Parents that do not exist are made for it, for it must be
+    the same one before and after the directory is there; they go with it where they stay empty. On disks that
+    know no locks there is none.
 
     Parameters
     ----------
@@ -25,9 +28,11 @@ def locked(directory: str | Path) -> Iterator[None]:
     Raises
     ------
     OutputError
-        Another run is writing there.
+        Another run is writing there, or a directory stands in the place of the lock.
     """
-    path = _lock_path(Path(directory).resolve())
+    target = Path(directory).resolve()
+    path = target.with_name(f".{target.name}.lock") if target.name else target / ".lock"
+    made = [folder for folder in target.parents if not folder.exists()]
     descriptor = None
     try:
         with _undisturbed():
@@ -38,6 +43,9 @@ def locked(directory: str | Path) -> Iterator[None]:
             with suppress(OSError):
                 path.unlink()
             os.close(descriptor)
+        for folder in made:
+            with suppress(OSError):  # it holds the results, or what others have written meanwhile
+                folder.rmdir()
 
 
 @contextmanager
@@ -50,16 +58,21 @@ def _undisturbed() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _lock_path(target: Path) -> Path:
-    home = next(folder for folder in target.parents if folder.is_dir())
-    return home / f".{'-'.join(target.relative_to(home).parts)}.lock"
-
-
 def _acquire(path: Path, directory: str | Path) -> int | None:
     """Descriptor of the locked file; None where locks are not to be had."""
+    attempts = iter(range(_ATTEMPTS))
     while True:
         try:
+            path.parent.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except FileNotFoundError:  # a run that failed has removed the parents it had made
+            if next(attempts, None) is None:
+                return None
+            continue
+        except IsADirectoryError as error:
+            raise OutputError(
+                f"cannot lock {directory}: {path} is a directory", "remove it, or choose another directory"
+            ) from error
         except OSError:  # what cannot be written at all is told by those who write
             return None
         try:

@@ -7,6 +7,7 @@ import numpy as np
 
 from glassslam.errors import GlassSlamError
 from glassslam.records import FloatArray
+from glassslam.regularfile import regular
 
 _LARGEST = 1e100
 """Larger numbers are no measurements, and have no square."""
@@ -21,7 +22,7 @@ def read_text(path: str | Path, error: type[GlassSlamError]) -> str:
         Of the given kind, when the file cannot be read or is no text.
     """
     try:
-        return Path(path).read_text(encoding="utf-8")
+        return regular(path).read_text(encoding="utf-8")
     except OSError as cause:
         raise error(f"cannot read {path}: {cause.strerror}") from cause
     except UnicodeDecodeError as cause:

@@ -1,10 +1,11 @@
 """Parameters of the sensor, of SLAM and of the map."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from glassslam.parameters.base import (
+    Cell,
     Count,
     Noise,
     NonNegative,
@@ -34,6 +35,14 @@ class SensorConfig(Section):
     """Distance by which beams pass the axis of the lidar on the left, m; lidars that triangulate have it."""
     range_offset: Small = 0.0
     """What is added to every range with an echo, m."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        """Refuse limits that leave no range."""
+        if not self.min_range < self.max_range:
+            low, high = self.min_range, self.max_range
+            raise ValueError(f"no range lies between min_range {low:g} and max_range {high:g} m")
+        return self
 
 
 class FilterConfig(Section):
@@ -84,8 +93,8 @@ class MotionFilterConfig(Section):
 class GridConfig(Section):
     """A probability grid."""
 
-    resolution: Positive = 0.05
-    """Cell edge, m."""
+    resolution: Cell = 0.05
+    """Cell edge, at most 1 m."""
     hit_probability: Annotated[float, Field(gt=0.5, lt=1)] = 0.55
     """P(occupied) after one return."""
     miss_probability: Annotated[float, Field(gt=0, lt=0.5)] = 0.49

@@ -18,8 +18,8 @@ from glassslam.parameters.base import (
 class VolumeConfig(Section):
     """3D maps from the lidar and the points of 3D ultrasonic sensors."""
 
-    resolution: Annotated[float, Field(ge=0.005, allow_inf_nan=False)] = 0.05
-    """Edge of a voxel, m."""
+    resolution: Annotated[float, Field(ge=0.005, le=1.0, allow_inf_nan=False)] = 0.05
+    """Edge of a voxel, at most 1 m."""
     lidar_height: Height | None = None
     """Height of the plane of the lidar above the base, m; without one that of the recording, or else 0.2."""
     band_low: Height = 0.1

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from glassslam.errors import OutputError, SessionError
 from glassslam.session import schema
+from glassslam.session.aside import remove_logs
+from glassslam.session.log import is_lost
 
 _MAGIC = b"SQLite format 3\0"
 _HEADER_BYTES = 100
-_ASIDE = ("-wal", "-shm", "-journal")
 _ONE = (1).to_bytes(4, "big")
 _PLACES = (60, 68)  # of the user version and the application id: the file format of SQLite
 
@@ -86,6 +87,8 @@ def open_existing(path: Path) -> sqlite3.Connection:
         It cannot be written.
     """
     check_header(path)
+    if is_lost(path, int.from_bytes(_head(path)[16:18], "big")):
+        raise damaged(path, "the log beside it has lost its header")
     with explained(path):
         database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
         try:
@@ -162,6 +165,12 @@ def check_header(path: Path) -> None:
         )
 
 
+def is_begun(path: Path) -> bool:
+    """Whether a file, or the log beside it, holds anything: the session of a run, sound or damaged."""
+    files = path, path.with_name(f"{path.name}-wal")
+    return any(file.is_file() and file.stat().st_size for file in files)
+
+
 def is_session(path: Path) -> bool:
     """Whether a file is a session of any version, as far as its first bytes tell."""
     try:
@@ -211,6 +220,7 @@ def write_compact(database: sqlite3.Connection, path: Path, target: Path) -> Non
     """
     with suppress(FileNotFoundError):
         target.unlink()
+    remove_logs(target)  # of a copy that was killed
     with explained(path):
         database.execute("VACUUM INTO ?", (str(target),))
     # what the header tells of the way of the file: logs, changes, tables made, changes again
@@ -218,10 +228,3 @@ def write_compact(database: sqlite3.Connection, path: Path, target: Path) -> Non
         for place, value in ((18, b"\1\1"), (24, _ONE), (40, _ONE), (92, _ONE)):
             file.seek(place)
             file.write(value)
-
-
-def remove_logs(path: Path) -> None:
-    """Remove what the database keeps beside a session that is closed: nothing is left to be read from it."""
-    for ending in _ASIDE:
-        with suppress(FileNotFoundError):
-            path.with_name(f"{path.name}{ending}").unlink()

@@ -9,6 +9,15 @@ from glassslam.errors import SessionError
 
 _BLOCK = 1 << 18
 _BLOCKS = 64
+_DATABASE = b"SQLite format 3\0"
+_LOGS = ("-wal", "-journal")
+
+_ANEW = "map it anew, with --overwrite"
+_MERGED = (
+    "a program that opens a database merges the log beside it (-wal): bring back both files as they were,"
+    f" or {_ANEW}"
+)
+_RING = f"bring it back as it was, or {_ANEW}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +62,8 @@ def identify(path: str | Path) -> Recorded:
 def digest(path: str | Path) -> str:
     """Digest of size and content: whole up to 16 MB, beyond that of 64 blocks spread evenly.
 
-    Names count within a directory only, where one file may refer to another.
+    Names count within a directory only, where one file may refer to another. The logs that a recorder has
+    left beside a database are part of it.
 
     Raises
     ------
@@ -62,14 +72,19 @@ def digest(path: str | Path) -> str:
     """
     total, folder = hashlib.blake2b(digest_size=20), Path(path)
     for file in _files(folder):
-        size, name = file.stat().st_size, "" if file == folder else file.name
+        size, name = file.stat().st_size, file.name if folder.is_dir() else file.name[len(folder.name) :]
         total.update(f"{name} {size}\n".encode(errors="surrogateescape"))
         for block in _blocks(file, size):
             total.update(block)
     return total.hexdigest()
 
 
-def checked(known: Sequence[Recorded], now: Sequence[str | Path] | None, sonar: Recorded | None) -> list[str]:
+def checked(
+    known: Sequence[Recorded],
+    now: Sequence[str | Path] | None,
+    sonar: Recorded | None,
+    ring: Recorded | None = None,
+) -> list[str]:
     """Paths to read the recordings of a run from, when they are the same as ever.
 
     Parameters
@@ -80,6 +95,8 @@ def checked(known: Sequence[Recorded], now: Sequence[str | Path] | None, sonar: 
         Where that is now; where it was when left out.
     sonar : Recorded, optional
         The second file with sonar readings.
+    ring : Recorded, optional
+        The file that tells where the sonars sit.
 
     Raises
     ------
@@ -95,25 +112,42 @@ def checked(known: Sequence[Recorded], now: Sequence[str | Path] | None, sonar: 
         _check_same(path, recorded)
     if sonar is not None:
         _check_same(sonar.found(), sonar)
+    if ring is not None and not _is_same(ring.path, ring, _RING):
+        raise SessionError(f"{ring.path} is not the ring of sonars that the run has read", _RING)
     return paths
 
 
 def _check_same(path: str, known: Recorded) -> None:
+    if not _is_same(path, known, "name the recording where it is now, before --resume"):
+        hint = _MERGED if any(map(_is_database, _files(Path(path)))) else _ANEW
+        raise SessionError(f"{path} is not the recording the run has read", hint)
+
+
+def _is_same(path: str, known: Recorded, hint: str) -> bool:
     try:
-        same = digest(path) == known.digest
+        return digest(path) == known.digest
     except OSError as error:
-        raise SessionError(
-            f"cannot read {path}: {error.strerror}", "name the recording where it is now, before --resume"
-        ) from error
-    if not same:
-        raise SessionError(f"{path} is not the recording the run has read", "map it anew")
+        raise SessionError(f"cannot read {path}: {error.strerror}", hint) from error
 
 
 def _files(path: Path) -> Sequence[Path]:
     if not path.is_dir():
-        return [path]
+        return [path, *(_logs(path) if _is_database(path) else ())]
     # what a database keeps beside it while it is read is no part of a recording
     return sorted(file for file in path.iterdir() if file.is_file() and not file.name.endswith("-shm"))
+
+
+def _logs(database: Path) -> Iterator[Path]:
+    """Logs beside a database; an empty one is as good as none."""
+    for ending in _LOGS:
+        log = database.with_name(f"{database.name}{ending}")
+        if log.is_file() and log.stat().st_size:
+            yield log
+
+
+def _is_database(file: Path) -> bool:
+    with file.open("rb") as stream:
+        return stream.read(len(_DATABASE)) == _DATABASE
 
 
 def _blocks(file: Path, size: int) -> Iterator[bytes]:

@@ -8,8 +8,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from glassslam.errors import SessionError
 from glassslam.session.database import damaged, explained
-from glassslam.session.rows import closure_of, node_row, scan_outcome, scan_row, search_row
+from glassslam.session.rows import (
+    closure_of,
+    node_row,
+    same_points,
+    scan_outcome,
+    scan_row,
+    scan_stamps,
+    search_row,
+)
 from glassslam.session.schema import insert, transaction, unsealed
 from glassslam.slam.closure import Closure
 from glassslam.slam.journal import ScanOutcome
@@ -17,6 +26,7 @@ from glassslam.slam.node import Node
 
 _SECONDS_BETWEEN_COMMITS = 1.0
 _TABLES = ("scans", "nodes", "rounds", "searches")
+_HINT = "go on with the recording as it was, or map this one anew, with --overwrite"
 
 
 class SessionJournal:
@@ -52,6 +62,9 @@ class SessionJournal:
             for table in _TABLES
         )
         self._known, self._known_rounds = self.scans, self._rounds
+        self._last_scan: tuple[Any, ...] = ()
+        self._last_node: tuple[Any, ...] | None = None
+        self._last_searched: list[int] = []
         self._new: dict[str, list[tuple[Any, ...]]] = {table: [] for table in _TABLES}
         self._due = clock() + seconds
 
@@ -68,11 +81,44 @@ class SessionJournal:
         row, self._recalled = self._row("scans", self._recalled), self._recalled + 1
         with self._sensible():
             outcome = scan_outcome(row)
+        self._last_scan, self._last_node = row, None
         if outcome.is_node:
-            # nothing of it is needed now, but the session of the finished run will hold it
-            self._row("nodes", self._recalled_nodes)
+            self._last_node = self._row("nodes", self._recalled_nodes)
             self._recalled_nodes += 1
         return outcome
+
+    def confirm_scan(self, stamp: float, returns: int, node: Node | None) -> None:
+        """Make sure that the scan recalled last is this one, and became this node.
+
+        Raises
+        ------
+        SessionError
+            It is another scan.
+        """
+        number, before = self._recalled - 1, float(scan_stamps([self._last_scan])[0])
+        known = scan_outcome(self._last_scan)
+        if stamp != before:
+            raise _other(f"scan {number} is of {stamp:.6f} s, and was of {before:.6f} s")
+        if returns != known.returns:
+            raise _other(f"scan {number} has {returns} returns, and had {known.returns}")
+        if (node is None) != (self._last_node is None):
+            raise _other(f"scan {number} {'adds' if node else 'does not add'} to the map, unlike before")
+        if node is not None and self._last_node is not None:
+            with self._sensible():
+                same = same_points(self._last_node, node_row(node))
+            if not same:
+                raise _other(f"scan {number} has other returns")
+
+    def confirm_end(self) -> None:
+        """Make sure, at the end of the records, that all scans that are known have come.
+
+        Raises
+        ------
+        SessionError
+            Some have not.
+        """
+        if self._recalled < self._known:
+            raise _other(f"it ends after {self._recalled} of the {self._known} scans known of it")
 
     def keep_scan(self, stamp: float, outcome: ScanOutcome, node: Node | None) -> None:
         """Write down what became of a scan, and the node it became."""
@@ -93,12 +139,29 @@ class SessionJournal:
         """
         if self._recalled_rounds == self._known_rounds:
             return None
-        _, count = self._row("rounds", self._recalled_rounds)
+        number, count = self._row("rounds", self._recalled_rounds)
         self._recalled_rounds += 1
         first = self._recalled_searches
         self._recalled_searches += count
         with self._sensible():
-            return [closure_of(self._row("searches", first + k)) for k in range(count)]
+            rows = [self._row("searches", first + k) for k in range(count)]
+            closures = [closure_of(row) for row in rows]
+        if any(row[1] != number for row in rows):
+            raise damaged(self._path, f"a search of round {number} is of another one")
+        self._last_searched = [closure.candidate.node for closure in closures]
+        return closures
+
+    def confirm_round(self, nodes: range) -> None:
+        """Make sure that the round recalled last is one for these nodes.
+
+        Raises
+        ------
+        SessionError
+            It has searched for others.
+        """
+        number = self._recalled_rounds - 1
+        if others := [node for node in self._last_searched if node not in nodes]:
+            raise _other(f"round {number} of searches was made for node {others[0]}, which is not due there")
 
     def keep_round(self, closures: Sequence[Closure]) -> None:
         """Write down what a round of searches found."""
@@ -142,3 +205,7 @@ class SessionJournal:
             yield
         except (ValueError, TypeError, struct.error) as error:
             raise damaged(self._path, f"{type(error).__name__} {error}") from error
+
+
+def _other(why: str) -> SessionError:
+    return SessionError(f"the recording is not what it was when the run began: {why}", _HINT)

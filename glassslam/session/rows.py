@@ -18,6 +18,7 @@ from glassslam.slam.tracking import Event, How, Match, Tracking
 Row = Sequence[Any]
 
 _carried_on = attrgetter(*(field.name for field in fields(Tracking)))
+_SAME_POINT = 1e-4
 _DOUBLE = struct.Struct("<d")
 
 
@@ -46,6 +47,17 @@ def scan_outcome(row: Row) -> ScanOutcome:
 def scan_stamps(rows: Sequence[Row]) -> FloatArray:
     """Stamps of rows of `scans`, s, shape (n,)."""
     return np.array([_number(row[1]) for row in rows])
+
+
+def same_points(before: Row, now: Row) -> bool:
+    """Whether two rows of `nodes` hold the same points.
+
+    Another processor may round otherwise; what differs by less than 0.1 mm is the same.
+    """
+    return all(
+        len(a) == len(b) and np.allclose(_points(a), _points(b), rtol=0.0, atol=_SAME_POINT)
+        for a, b in zip(before[-3:], now[-3:], strict=True)
+    )
 
 
 def node_row(node: Node) -> tuple[Any, ...]:

@@ -5,7 +5,6 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,13 @@ from glassslam.errors import SessionError
 from glassslam.session import schema
 from glassslam.session.database import create
 from glassslam.session.rows import closure_of, node_of, scan_outcome
+from glassslam.session.salvage_pages import views
 from glassslam.session.store import FINISHED
-from glassslam.sources.sqlitepages import Cell, PageFile, overlay_of, values
+from glassslam.sources.sqlitepages import Cell, PageFile, values
 from glassslam.sources.windows import BrokenRecordError
 
 _NEEDED = ("glassslam", "config", "recordings", "sonar", "options")
 _NAMED = ("facts", "arrays")
-_PAGE_BYTES = 4096
 _ANEW = "map the recording anew, with --overwrite"
 
 Rows = dict[Any, tuple[Any, ...]]
@@ -86,15 +85,42 @@ def salvage(path: Path, target: Path) -> Salvage:
     return Salvage(len(scans), len(nodes), len(rounds), len(found["scans"]) - len(scans), whole)
 
 
+def scans_found(path: Path) -> int:
+    """How many scans could be saved of a session: more than it holds where a part of its log is passed over.
+
+    Raises
+    ------
+    SessionError
+        It cannot be read.
+    """
+    found = _rows(path)
+    return len(_beginning(found["scans"], found["nodes"])[0])
+
+
 def _rows(path: Path) -> dict[str, Rows]:
-    """All rows with a sound seal, by table and by number or name."""
+    """All rows with a sound seal, by table and by number or name.
+
+    Numbered rows are never changed: it does not matter where they are found. Named ones are, and belong
+    together: they are those of the first view that tells what the run is.
+    """
     found: dict[str, Rows] = {table: {} for table in schema.TABLES}
+    is_told = False
     try:
-        pages = _pages(path)
-    except BrokenRecordError as error:
-        raise SessionError(f"{path} cannot be saved: {error}", _ANEW) from error
+        for pages in views(path):
+            seen = _rows_of(pages)
+            if not is_told:
+                is_told = all(name in seen["facts"] for name in _NEEDED)
+                found |= {table: seen[table] for table in _NAMED}
+            for table, rows in seen.items():
+                if table not in _NAMED:
+                    found[table] = {**rows, **found[table]}
     except OSError as error:
         raise SessionError(f"cannot read {path}: {error.strerror}") from error
+    return found
+
+
+def _rows_of(pages: PageFile) -> dict[str, Rows]:
+    found: dict[str, Rows] = {table: {} for table in schema.TABLES}
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
         schema.create_tables(memory)
         for table, row in _shaped(pages):
@@ -102,15 +128,6 @@ def _rows(path: Path) -> dict[str, Rows]:
                 read = _as_read(memory, table, row)
                 found[table][read[0]] = read
     return found
-
-
-def _pages(path: Path) -> PageFile:
-    """Pages of the file and of the log beside it; where the header is lost, those of a file as this one."""
-    content = bytearray(path.read_bytes())
-    if not content.startswith(b"SQLite format 3\0"):
-        content[16:21] = _PAGE_BYTES.to_bytes(2, "big") + b"\1\1\0"
-        return PageFile(path, BytesIO(content))
-    return PageFile(path, BytesIO(content), overlay_of(path))
 
 
 def _shaped(pages: PageFile) -> Iterator[tuple[str, list[Any]]]:

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from glassslam.config import Config
-from glassslam.errors import SessionError
+from glassslam.errors import OutputError, SessionError
 from glassslam.finished import FinishedRun
 from glassslam.records import FloatArray
+from glassslam.session.aside import remove_damaged, remove_logs
 from glassslam.session.database import (
     complete_file,
     create,
@@ -20,7 +21,6 @@ from glassslam.session.database import (
     explained,
     open_existing,
     reading,
-    remove_logs,
     write_compact,
 )
 from glassslam.session.identity import Recorded, checked, identify
@@ -39,6 +39,7 @@ from glassslam.session.store import (
 from glassslam.slam.closure import Closure
 from glassslam.slam.node import Node
 from glassslam.sources import SourceOptions
+from glassslam.sources.rings import ring_names
 from glassslam.yamltext import parse_yaml
 
 SESSION_FILE: Final = "session.db"
@@ -85,6 +86,7 @@ class Session:
             self.config = Config.from_mapping(parse_yaml(self._facts["config"]), str(path))
             self.recordings = tuple(Recorded(**known) for known in self._facts["recordings"])
             self._sonar = self._facts["sonar"] and Recorded(**self._facts["sonar"])
+            self._ring = _ring_file(self._facts["options"])
             self.options = _options(self._facts["options"], self._sonar)
             self.version = str(self._facts["glassslam"])
         except (KeyError, TypeError, ValueError) as error:
@@ -115,17 +117,19 @@ class Session:
         Raises
         ------
         OutputError
-            The file cannot be written.
+            The file exists already, or cannot be written.
         OSError
             A recording cannot be read.
         """
+        if Path(path).exists():
+            raise OutputError(f"{path} exists already", "name a new file, or go on with it: Session.open")
         options = options or SourceOptions()
         facts = {
             "glassslam": metadata.version("glassslam"),
             "config": (config or Config()).dump(),
             "recordings": [asdict(identify(recording)) for recording in recordings],
             "sonar": None if options.sonar is None else asdict(identify(options.sonar)),
-            "options": {**asdict(options), "sonar": None, "sonar_ring": _text(options.sonar_ring)},
+            "options": {**asdict(options), "sonar": None, "sonar_ring": _ring(options.sonar_ring)},
         }
         path = Path(path)
         return cls(path, create(path, lambda database: write_facts(database, facts)))
@@ -148,7 +152,7 @@ class Session:
 
     @staticmethod
     def copy(path: str | Path, target: Path) -> None:
-        """Copy a session file that no run is using; it may be of an earlier version.
+        """Copy a session file that no run is using, whole or not at all; it may be of an earlier version.
 
         Raises
         ------
@@ -157,8 +161,13 @@ class Session:
         OutputError
             The copy cannot be written.
         """
+        fresh = target.with_name(f"{target.name}.new")
         with reading(Path(path)) as database:
-            write_compact(database, Path(path), target)
+            write_compact(database, Path(path), fresh)
+        try:
+            fresh.replace(target)
+        except OSError as error:
+            raise OutputError(f"cannot write {target}: {error.strerror}") from error
 
     @property
     def is_finished(self) -> bool:
@@ -178,7 +187,7 @@ class Session:
         SessionError
             One is missing or has changed.
         """
-        return checked(self.recordings, recordings, self._sonar)
+        return checked(self.recordings, recordings, self._sonar, self._ring)
 
     def change(self, config: Config, *, keep_findings: bool) -> None:
         """Take another configuration for what is still to be done.
@@ -304,6 +313,7 @@ class Session:
         if settled == self.path:
             remove_logs(self.path)
         os.replace(compact, settled)  # noqa: PTH105  (tests make exactly this call fail)
+        remove_damaged(settled)
         return settled
 
     def close(self) -> None:
@@ -344,11 +354,20 @@ class Session:
 def _options(values: dict[str, Any], sonar: Recorded | None) -> SourceOptions:
     given: dict[str, Any] = {name: tupled(value) for name, value in values.items()}
     given["sonar"] = None if sonar is None else sonar.found()
+    if (ring := _ring_file(values)) is not None:
+        given["sonar_ring"] = ring.path
     return SourceOptions(**given)
 
 
-def _text(value: str | Path | None) -> str | None:
-    """An option that may be a name or a file: files by their whole path, which leads there from anywhere."""
-    if value is None or not Path(value).is_file():
+def _ring(value: str | Path | None) -> str | dict[str, str] | None:
+    """Where the sonars sit, by name or as a file: that by its whole path, which leads there from anywhere."""
+    if value is None or str(value) in ring_names() or not Path(value).is_file():
         return None if value is None else str(value)
-    return str(Path(value).resolve())
+    known = identify(value)
+    return {"path": known.path, "digest": known.digest}
+
+
+def _ring_file(values: dict[str, Any]) -> Recorded | None:
+    """The file that tells where the sonars sit; None where it is a name, or none is given."""
+    ring = values["sonar_ring"]
+    return Recorded(given=ring["path"], **ring) if isinstance(ring, dict) else None

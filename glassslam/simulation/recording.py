@@ -72,8 +72,13 @@ def write_recording(
     if mount is not None:
         x, y, yaw = mount.pose
         heights = {"ultrasonic": (x, y, mount.height, yaw), "laser_height": scene.laser_height}
-    scans = write_rosbag1(simulation.records(log.add), bag, scene.laser_pose, report, ring, **heights)
-    for stale in truth_paths(bag):
-        stale.unlink(missing_ok=True)
+
+    # Before the bag changes: a bag without a truth is one, a bag beside the truth of another is a trap.
+    def forget() -> None:
+        for stale in truth_paths(bag):
+            stale.unlink(missing_ok=True)
+
+    records = simulation.records(log.add)
+    scans = write_rosbag1(records, bag, scene.laser_pose, report, ring, **heights, replacing=forget)
     truth = write_truth(simulation, bag, log)
     return WrittenRecording(Path(bag), *truth, scans=scans)

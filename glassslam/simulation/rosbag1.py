@@ -37,6 +37,7 @@ def write_rosbag1(
     ring: SonarRing | None = None,
     ultrasonic: tuple[float, float, float, float] | None = None,
     laser_height: float = 0.0,
+    replacing: Callable[[], None] | None = None,
 ) -> int:
     """Write scans and odometry as `/scan`, `/odom`, `/tf` (odom to base_link) and `/tf_static`.
 
@@ -61,6 +62,8 @@ def write_rosbag1(
         Pose x, y, z, yaw of a 3D ultrasonic sensor on the base, m and rad; without it points are left out.
     laser_height : float
         Height of the laser above the base, m.
+    replacing : callable, optional
+        Called when the bag is complete, just before it takes its name.
 
     Returns
     -------
@@ -85,6 +88,8 @@ def write_rosbag1(
             scans = _write_all(bag, records, laser, progress)
         with partial.open("rb") as done:
             os.fsync(done.fileno())
+        if replacing is not None:
+            replacing()
         partial.replace(target)
     except OSError as error:
         raise OutputError(f"cannot write {target}: {error.strerror}") from error

@@ -53,15 +53,18 @@ class DetectorChoice:
         self.calibration: Calibration | None = None
         self.is_pending, self.wants_nodes_only = self._waits(), False
         self._verdict_due = config.detector in _BY_INTENSITY
+        self._too_coarse = ""
         if config.detector != "off" and not self.is_pending:
             self._use(config.detector, "asked for")
 
     @property
     def warnings(self) -> list[str]:
-        """That glass was asked for and is not looked for; empty otherwise."""
-        if self.name != "off" or self._config.detector in ("auto", "off"):
+        """That glass was asked for and is not looked for, or cannot be found so; empty otherwise."""
+        if self._config.detector in ("auto", "off"):
             return []
-        return [f"glass is not looked for: {self.reason}"]
+        if self.name == "off":
+            return [f"glass is not looked for: {self.reason}"]
+        return [self._too_coarse] if self._too_coarse else []
 
     def add(self, scan: LaserScan, *, is_node: bool) -> None:
         """Take a scan into account; nodes are the sample, for they are seen from different places."""
@@ -97,6 +100,7 @@ class DetectorChoice:
                 )
         elif self.is_pending:
             self._suit()
+        self._too_coarse = self._coarseness()
         self.is_pending, self._sample, self._others = False, [], []
 
     def _is_due(self) -> bool:
@@ -163,6 +167,18 @@ class DetectorChoice:
 
         self.detect, self.name = calibrated(self.calibration), "calibrated_peak"
         self.reason = f"calibrated on {self.calibration.evidence['scans']} scans of this recording"
+
+    def _coarseness(self) -> str:
+        """That the detector asked for by name finds no peaks in beams so far apart; empty where it may."""
+        from detectors.self_calibration import COARSEST_STEP  # noqa: PLC0415
+
+        step = abs(self._sample[-1].angle_increment) if self._sample else 0.0
+        if self._config.detector != "calibrated_peak" or step <= COARSEST_STEP:
+            return ""
+        return (
+            f"glass can hardly be found: beams {math.degrees(step):.2g} deg apart are too few for a peak, "
+            f"calibrated_peak needs {math.degrees(COARSEST_STEP):.2g} deg or less (see glass.detector)"
+        )
 
     def _learnt(self) -> "Calibration":
         from detectors.self_calibration import self_calibration  # noqa: PLC0415

@@ -188,6 +188,8 @@ class GlobalSlam:
             self._pending = self._pool.submit(
                 self._search, candidates, list(self.nodes), np.array(self._travel), list(self.submaps)
             )
+        elif not self.is_hurried:
+            self._journal.confirm_round(range(self._searched, last))
         self._searched = last
 
     def _search(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from glassslam.config import Config
-from glassslam.errors import NoScansError, SessionError
+from glassslam.errors import NoScansError
 from glassslam.geometry import compose
 from glassslam.records import FloatArray, Imu, LaserScan, Odometry, Record, RecordingInfo, Trajectory
 from glassslam.slam.extrapolator import PoseExtrapolator, Prediction
@@ -15,6 +15,7 @@ from glassslam.slam.glass_watch import GlassWatch, Look
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.journal import Journal, NoJournal, ScanOutcome
 from glassslam.slam.local import LocalResult, LocalSlam, prepared
+from glassslam.slam.motion_watch import MotionWatch
 from glassslam.slam.range_data import RangeData, prepare
 from glassslam.slam.result import MapResult
 from glassslam.slam.scan_check import checked_mount, defect, mended, sweep_time
@@ -68,7 +69,7 @@ class Mapper:
         self._global = GlobalSlam(self._config, self._stages, self._journal)
         self._poses: list[FloatArray] = []
         self._corrections: list[FloatArray] = []
-        self._tally = Tally()
+        self._tally = Tally(motion=MotionWatch(float(self._base_from_laser[2])))
         self._glass = GlassWatch(self._config.glass, self._base_from_laser, self._config.sensor)
 
     @property
@@ -113,9 +114,13 @@ class Mapper:
         ------
         NoScansError
             Not one usable scan came in, or not one had a return.
+        SessionError
+            The records are not those of the earlier run.
         """
         try:
             self._process(self._waiting.take(everything=True))
+            if not self.is_hurried:
+                self._journal.confirm_end()
             for submap in self._local.finish():
                 self._global.add_submap(submap)
             self._check_seen()
@@ -176,13 +181,13 @@ class Mapper:
         self._poses.append(result.pose_in_local)
         self._corrections.append(self._local.locks.map_from_local)
         self._glass.add(look, result)
-        self._tally.place(scan, returns, with_odometry=odometry is not None)
+        self._tally.place(scan, returns, odometry, result.pose_in_local)
         return result
 
     def _matched(self, scan: LaserScan, prediction: Prediction, look: Look) -> tuple[LocalResult, int]:
         """Local SLAM for a scan, and the number of its returns."""
         data = self._range_data(scan, prediction, look)
-        returns = len(data.returns) + len(data.ghosts)
+        returns = _returns(data)
         match = self._local.match(data, prediction)
         result = self._local.enter(match, data, look.points)
         if not self.is_hurried:
@@ -193,15 +198,13 @@ class Mapper:
     def _repeated(
         self, known: ScanOutcome, scan: LaserScan, prediction: Prediction, look: Look
     ) -> tuple[LocalResult, int]:
-        """The same with what is known of it from before; only nodes need their points."""
-        nothing = np.empty((0, 2))
-        data = RangeData(scan.stamp, self._base_from_laser[:2], nothing, nothing)
-        if known.is_node:
-            data = self._range_data(scan, prediction, look)
+        """The same with what is known of it from before."""
+        data = self._range_data(scan, prediction, look)
         self._local.tracking = replace(known.tracking)
         result = self._local.enter(known.match, data, look.points)
-        if (result.node is not None) != known.is_node:
-            raise SessionError("the session is not of this recording", "map the recording again")
+        # in a hurry scans do not wait for what comes after them, and so may come out otherwise
+        if not self.is_hurried:
+            self._journal.confirm_scan(scan.stamp, _returns(data), result.node)
         return result, known.returns
 
     def _range_data(self, scan: LaserScan, prediction: Prediction, look: Look) -> RangeData:
@@ -247,3 +250,7 @@ class Mapper:
             glass=self._glass.findings(),
             stages=self._stages,
         )
+
+
+def _returns(data: RangeData) -> int:
+    return len(data.returns) + len(data.ghosts)

@@ -1,10 +1,11 @@
 """Whatever a reader library raises on a foreign or damaged file becomes one clear line."""
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from glassslam.errors import GlassSlamError, RecordingError
+from glassslam.errors import GlassSlamError, RecordingError, UnreachableRecordingError
 
 DAMAGED_HINT = "the file looks truncated or damaged: copy it again, or repair it ({tool})"
 REPAIR_TOOLS = {
@@ -15,6 +16,9 @@ REPAIR_TOOLS = {
     "carmen": "'gzip -t' tells whether a compressed log is complete",
 }
 
+# What the system says of places that a damaged file leads to; all else is trouble with the disk.
+_OF_CONTENT = (None, errno.EINVAL, errno.EOVERFLOW, errno.EFBIG)
+
 
 @contextmanager
 def reading(path: Path, format_name: str = "") -> Iterator[None]:
@@ -23,15 +27,19 @@ def reading(path: Path, format_name: str = "") -> Iterator[None]:
     Raises
     ------
     RecordingError
-        Anything at all went wrong inside.
+        Anything at all went wrong inside; `UnreachableRecordingError` where it is the disk, not the content.
     """
     try:
         yield
     except GlassSlamError:
         raise
     except PermissionError as error:
-        raise RecordingError(f"cannot read {path}: permission denied") from error
+        raise UnreachableRecordingError(f"cannot read {path}: permission denied") from error
     except Exception as error:
+        if isinstance(error, OSError) and error.errno not in _OF_CONTENT:
+            raise UnreachableRecordingError(
+                f"cannot read {path}: {describe(error)}", "its disk or the connection to it fails"
+            ) from error
         tool = REPAIR_TOOLS.get(format_name)
         raise RecordingError(
             f"cannot read {path}: {describe(error)}", DAMAGED_HINT.format(tool=tool) if tool else ""

@@ -1,5 +1,6 @@
 """Which kind of recording a path is, told by its content."""
 
+import difflib
 import re
 import zlib
 from collections.abc import Sequence
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from glassslam.errors import RecordingError
+from glassslam.regularfile import regular
 from glassslam.sources.failures import reading
 
 Format: TypeAlias = Literal["rosbag1", "rosbag2-sqlite3", "rosbag2-mcap", "carmen", "player", "pimap"]
@@ -38,6 +40,7 @@ _PLAYER_LINE = re.compile(
 )
 # Index, counter, counter, ticks of 100 ns since the year 1, then readings.
 _PIMAP_LINE = re.compile(rb"^\d+ \d+ \d+ 6\d{17}(?: -?[\d.]+){3,}\s*$", re.MULTILINE)
+_PART = re.compile(r"\.mcap|\.db3|^metadata\.yaml$")
 _HEAD_BYTES = 1 << 16
 # Fed in small steps: a decompressor that meets damage returns nothing of that step.
 _STEP_BYTES = 256
@@ -68,7 +71,7 @@ def resolve(paths: Sequence[str | Path]) -> tuple[Piece, ...]:
     Raises
     ------
     RecordingError
-        A path is missing, empty, foreign, or of another format than the rest.
+        A path is missing, empty, foreign, no file, or of another format than the rest.
     """
     pieces = tuple(piece for path in paths for piece in _expand(Path(path)))
     if not pieces:
@@ -85,9 +88,12 @@ def resolve(paths: Sequence[str | Path]) -> tuple[Piece, ...]:
 def _expand(path: Path) -> tuple[Piece, ...]:
     with reading(path):
         if not path.exists():
-            raise RecordingError(f"{path} does not exist")
+            raise RecordingError(f"{path} does not exist", _likely(path))
         if not path.is_dir():
             return (_file(path),)
+        for part in path.iterdir():
+            if _PART.search(part.name):
+                _check_kind(part)
         files = sorted((p for p in path.iterdir() if p.suffix in {".mcap", ".db3"}), key=natural_order)
         if (path / "metadata.yaml").exists():
             return (Piece(path, _directory_format(path, files)),)
@@ -98,8 +104,28 @@ def _expand(path: Path) -> tuple[Piece, ...]:
         return tuple(map(_file, files))
 
 
+def _likely(path: Path) -> str:
+    """What may have been meant by a name that is not there; empty where nothing is called alike."""
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}"
+    names = [other.name for other in path.parent.iterdir()]
+    near = difflib.get_close_matches(path.name, names, n=1, cutoff=0.8)
+    return f"did you mean {path.with_name(near[0])}?" if near else ""
+
+
 def _file(path: Path) -> Piece:
+    for ending in ("", "-wal", "-journal"):  # a database is read with its logs
+        _check_kind(path.with_name(f"{path.name}{ending}"))
     return Piece(path, _detect(path), path.stat().st_size)
+
+
+def _check_kind(path: Path) -> None:
+    try:
+        regular(path)
+    except OSError as error:
+        raise RecordingError(
+            f"cannot read {path}: {error.strerror}", "a pipe or device is copied to a file first"
+        ) from error
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:

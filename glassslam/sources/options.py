@@ -66,13 +66,15 @@ class SourceOptions:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.start) and self.start >= 0):
-            raise UsageError(f"start must be a time of 0 s or more, not {self.start:g}")
+            raise UsageError(f"--start must be a time of 0 s or more, not {self.start:g}")
         if self.duration is not None and not (math.isfinite(self.duration) and self.duration > 0):
-            raise UsageError(f"duration must be a time above 0 s, not {self.duration:g}")
+            raise UsageError(f"--duration must be a time above 0 s, not {self.duration:g}")
         if self.every < 1:
-            raise UsageError(f"every must be 1 or more, not {self.every}")
+            raise UsageError(f"--every must be 1 or more, not {self.every}")
         if self.echo not in get_args(Echo):
-            raise UsageError(f"unknown echo {self.echo!r}", f"known here: {', '.join(get_args(Echo))}")
+            raise UsageError(
+                f"--echo: unknown echo {self.echo!r}", f"known here: {', '.join(get_args(Echo))}"
+            )
         if self.laser_pose is not None and not _is_pose(self.laser_pose):
             raise UsageError(f"laser pose must be three finite numbers x,y,yaw, not {self.laser_pose}")
         if self.scan_topic == UNUSED:

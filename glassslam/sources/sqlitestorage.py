@@ -9,7 +9,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2.metadata import ReaderMetadata
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-from glassslam.errors import RecordingError
+from glassslam.errors import RecordingError, UnreachableRecordingError
 from glassslam.records import Damage
 from glassslam.sources.failures import DAMAGED_HINT, REPAIR_TOOLS, reading
 from glassslam.sources.sqlitelogs import Overlay, logs_beside
@@ -171,6 +171,8 @@ class SqliteStorage(Sqlite3Reader):
         try:
             with reading(self.file_path, _FORMAT):
                 index = self._known(scan_sqlite(self.file_path, self._overlay))
+        except UnreachableRecordingError:  # the database tells a failing disk and damage with the same words
+            raise
         except RecordingError:
             raise error from None
         if not len(index.rows):

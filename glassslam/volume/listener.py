@@ -122,10 +122,15 @@ def _warnings(maps: VolumeMaps) -> Iterator[str]:
     lost, used = sum(maps.dropped.values()), maps.counts["points"]
     if lost > used:
         yield f"the volume holds {used} points, and more was left out: {_listed(maps.dropped)}"
-    low, high = maps.band
-    if not low <= maps.lidar_height <= high:
+    yield from plane_warnings(maps.lidar_height, maps.band)
+
+
+def plane_warnings(height: float, band: tuple[float, float]) -> Iterator[str]:
+    """That the map of a volume holds nothing of the lidar, whose height (m) is not in its band (m)."""
+    low, high = band
+    if not low <= height <= high:
         yield (
-            f"the plane of the lidar, {maps.lidar_height:g} m above the base, lies outside of the heights"
+            f"the plane of the lidar, {height:g} m above the base, lies outside of the heights"
             f" {low:g} to {high:g} m of the map of the volume (volume.lidar_height, volume.band_low)"
         )
 

@@ -6,6 +6,7 @@ from typing import BinaryIO
 import numpy as np
 
 from glassslam.errors import GridError, OutputError
+from glassslam.regularfile import regular
 from glassslam.volume.octree import Leaves, Octree
 from glassslam.volume.odds import Clamp
 
@@ -71,7 +72,7 @@ def load_volume(path: str | Path) -> Octree:
     """
     try:
         # a damaged file that numpy itself has opened would stay open
-        with Path(path).open("rb") as content, np.load(content, allow_pickle=False) as file:
+        with regular(path).open("rb") as content, np.load(content, allow_pickle=False) as file:
             arrays = {name: file[name] for name in _NAMES if name in file}
     except Exception as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "not an npz file"

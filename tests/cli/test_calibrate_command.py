@@ -113,7 +113,8 @@ def test_json_is_the_calibration_and_nothing_else(calls, tmp_path, capsys):
         ("a.bag --material glass", "a.bag: nothing says where the glass is"),
         ("a.bag --roi left", "--roi left: no region"),
         ("a.bag --distance 1 --align", "--align needs --panes"),
-        ("a.bag --start -1", "start must be a time of 0 s or more, not -1"),
+        ("a.bag --start -1", "--start must be a time of 0 s or more, not -1"),
+        ("a.bag b.bag x/../a.bag --distance 1", "x/../a.bag is named twice (its scans would count twice"),
     ],
 )
 def test_wrong_usage(calls, tmp_path, capsys, words, message):

@@ -1,6 +1,7 @@
 """`glassslam volume`: what it reads, writes and says."""
 
 import json
+import math
 import time
 from itertools import pairwise
 
@@ -8,10 +9,11 @@ import numpy as np
 import pytest
 
 from glassslam.cli.app import main
+from glassslam.cli.standing import Standing
 from glassslam.cli.volume import _followed
 from glassslam.config import Config
 from glassslam.outputs import read_map
-from glassslam.records import LaserScan, PointSet, RecordingInfo
+from glassslam.records import LaserScan, Odometry, PointSet, RecordingInfo
 from glassslam.simulation import Scene, simulate, write_recording
 from glassslam.volume.storage import load_volume
 
@@ -142,6 +144,37 @@ def test_the_height_of_the_lidar_is_recorded_or_said(bag, tmp_path, capsys):
     assert made(bag, tmp_path, capsys, "--set", "volume.lidar_height=0.8")["lidar_height"] == 0.8
 
 
+def test_a_robot_that_moves_without_a_trajectory_is_told(bag, tmp_path, capsys):
+    words = ["volume", str(bag), "-o", str(tmp_path / "run"), "--resolution", "0.2"]
+    assert main(words) == 0
+    text = "warning: by its odometry the robot moves 2.0 m, and all was placed as if it stood at the origin: "
+    assert f"{text}give its poses with --trajectory, as map writes them\n" in capsys.readouterr().out
+    assert made(bag, tmp_path, capsys)["warnings"] == []
+
+
+def test_a_lidar_outside_of_the_band_is_told(bag, tmp_path, capsys):
+    assert made(bag, tmp_path, capsys, "--lidar-height=-5")["warnings"] == [
+        "the plane of the lidar, -5 m above the base, lies outside of the heights 0.1 to 1.8 m of the map of "
+        "the volume (volume.lidar_height, volume.band_low)"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ([(1.0, 2.0, 0.3), (1.05, 2.0, 0.35)], []),
+        ([(math.nan, 2.0, 0.3)], []),
+        ([(1.0, 2.0, 3.1), (1.0, 2.0, -3.1)], []),
+        ([(1.0, 2.0, 0.0), (4.0, 6.0, 0.0), (1.0, 2.0, 0.0)], ["by its odometry the robot moves 5.0 m"]),
+        ([(1.0, 2.0, 0.0), (1.0, 2.0, 0.5)], ["by its odometry the robot moves 29 deg"]),
+    ],
+)
+def test_whether_a_robot_stands_is_told_by_its_odometry(poses, words):
+    robot, ways = Standing(), [Odometry(float(k), pose) for k, pose in enumerate(poses)]
+    assert list(robot.watched(ways)) == ways
+    assert [text.partition(", and all")[0] for text in robot.warnings] == words
+
+
 def test_parameters_come_from_the_configuration_and_options_go_before_it(bag, tmp_path, capsys):
     file = tmp_path / "mine.yaml"
     file.write_text("volume: {lidar_height: 0.7, lidar_max_range: 1.5, resolution: 0.5}\n", encoding="utf-8")
@@ -170,6 +203,8 @@ def test_what_the_lidar_is_believed_is_configured_as_for_map(bag, tmp_path, caps
             ["--points-topic", "/other"],
             "points topic /other is not in the recording; candidates: /ultrasonic",
         ),
+        (["--resolution", "1.5"], "--resolution"),
+        (["--laser-pose", "0.1,0,90"], "90 rad is more than a turn (90 deg is 1.5708 rad)"),
         (["--laser-pose", "1,2"], "--laser-pose 1,2: not three numbers x,y,yaw"),
     ],
 )

@@ -152,6 +152,33 @@ def test_scans_that_cannot_be_compared_are_places_of_their_own():
     assert places([]).tolist() == []
 
 
+def corner(first, step, count, x=0.0):
+    """A scan from inside a room of 6 m by 10 m, whose ranges change from beam to beam, and its layout."""
+    angles = first + step * np.arange(count)
+    with np.errstate(divide="ignore"):
+        sides = np.where(np.cos(angles) > 0, 3.0 - x, 3.0 + x) / np.abs(np.cos(angles))
+        return np.minimum(sides, 5.0 / np.abs(np.sin(angles))), (first, step)
+
+
+def numbered(*scans):
+    return places((ranges for ranges, _ in scans), [layout for _, layout in scans]).tolist()
+
+
+@pytest.mark.parametrize("count", [233, 240, 247])
+def test_beams_of_one_bearing_are_compared_where_their_number_varies(count):
+    turn = 2.0 * np.pi
+    still, again = corner(0.0, turn / 240, 240), corner(0.0006, turn / count, count)
+    assert numbered(still, again) == [0, 0]
+    assert numbered(still, corner(0.0006, turn / count, count, x=0.3)) == [0, 1]
+
+
+def test_where_a_turn_begins_and_which_way_it_goes_does_not_matter():
+    step = 2.0 * np.pi / 360
+    still = corner(-np.pi, step, 360)
+    assert numbered(still, corner(0.0, step, 360), corner(np.pi - step, -step, 360)) == [0, 0, 0]
+    assert numbered(corner(-0.01, step, 90), corner(np.pi, step, 90)) == [0, 1]  # nothing in common
+
+
 def test_a_few_beams_more_or_less_do_not_matter():
     assert places([np.full(80, 2.0), np.full(77, 2.0)]).tolist() == [0, 0]
 

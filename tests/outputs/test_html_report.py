@@ -485,6 +485,12 @@ def test_a_run_without_any_has_no_such_section(tiny_result, tmp_path):
     assert "Uncertain stretches" not in html(tiny_result, tmp_path)
 
 
+def test_none_is_said_where_there_are_no_uncertain_stretches(tiny_result, tmp_path):
+    tiny_result.statistics.tracking = {"searches_taken": 7}
+    page = html(tiny_result, tmp_path)
+    assert "<h2>Uncertain stretches</h2>\n<p>none</p>\n<details>" in page
+
+
 def test_very_many_stretches_are_cut(tiny_result, tmp_path):
     tiny_result.statistics.degeneracies = [stretch(("lost", "poor fit")[k % 2]) for k in range(450)]
     read = Page(html(tiny_result, tmp_path))

@@ -1,6 +1,8 @@
 """`glassslam render`: other results of the same run, equal to those of a run with the same parameters."""
 
 import shutil
+import subprocess
+import sys
 
 import pytest
 from session_worlds import WORDS, assert_same_results, interrupted, results, write_ring
@@ -10,6 +12,12 @@ from glassslam.config import Config
 from glassslam.errors import UsageError
 from glassslam.session.changes import needs_recording
 
+KILLED = """
+import os, sys
+from glassslam.cli import main, render
+render.conclude = lambda *_args, **_words: os._exit(9)
+main(sys.argv[1:])
+"""
 PLAIN = [*WORDS, "--set", "glass.scheme=anchored"]
 
 
@@ -114,6 +122,38 @@ def test_a_map_too_large_to_draw_keeps_its_poses(home, tmp_path, capsys):
     assert told in capsys.readouterr().err
     assert main(["render", str(target), "--set", "map.resolution=0.05", "-q"]) == 0
     assert_same_results(target, results(home / "run"))
+
+
+@pytest.mark.parametrize("again", [[], ["--set", "glass.thresh=2500"]], ids=["drawing", "reading"])
+def test_an_interrupted_drawing_leaves_the_results_and_nothing_else(
+    run, tmp_path, capsys, monkeypatch, again
+):
+    before = results(run)
+    if not again:
+        monkeypatch.setattr("glassslam.cli.render.conclude", _raise_interrupt)
+        code = main(["render", str(run), "--set", "map.resolution=0.1", "-q"])
+    else:
+        code = interrupted(["render", str(run), *again, "-q"], 50)
+    assert code == 130
+    assert capsys.readouterr().err == ("error: interrupted (the results are as they were; draw them again)\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    assert_same_results(run, before)
+
+
+def _raise_interrupt(*_args, **_words):
+    raise KeyboardInterrupt
+
+
+def test_a_drawing_that_was_killed_does_not_change_the_next_one(run, tmp_path):
+    before = results(run)
+    words = ["render", str(run), "--set", "map.resolution=0.1", "-q"]
+    assert subprocess.run([sys.executable, "-c", KILLED, *words], check=False).returncode == 9
+    assert (tmp_path / "run.partial" / "session.db").exists()
+    assert main(["map", "--resume", str(run), "-q"]) == 0
+    assert main(["recover", str(run)]) == 0
+    assert main(["render", str(run), "-q"]) == 0
+    assert_same_results(run, before)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
 def test_a_run_that_is_not_finished_is_finished_first(home, tmp_path, capsys):

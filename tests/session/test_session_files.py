@@ -7,7 +7,7 @@ import pytest
 from session_worlds import WORDS, assert_same_results, interrupted, rows_of
 
 from glassslam.cli import main
-from glassslam.errors import SessionError
+from glassslam.errors import OutputError, SessionError
 from glassslam.session import Session, is_session, schema
 
 
@@ -50,6 +50,16 @@ def refused(path, capsys):
     assert error.count("\n") == 1
     assert before is None or path.read_bytes() == before
     return error.removeprefix("error: ").removesuffix("\n")
+
+
+def test_a_new_session_never_goes_into_a_file_that_is_there(tmp_path):
+    path = tmp_path / "run.db"
+    path.write_bytes(b"precious")
+    with pytest.raises(OutputError) as caught:
+        Session.create(path, [])
+    assert caught.value.message == f"{path} exists already"
+    assert caught.value.hint == "name a new file, or go on with it: Session.open"
+    assert path.read_bytes() == b"precious"
 
 
 def test_a_session_of_a_newer_version(session, capsys):

@@ -1,10 +1,15 @@
 """A recording is known again by what it holds, wherever it is."""
 
 import os
+import shutil
+import sqlite3
 
 import pytest
 
-from glassslam.session.identity import digest, identify
+from glassslam.errors import SessionError
+from glassslam.session import Session
+from glassslam.session.identity import checked, digest, identify
+from glassslam.sources import SourceOptions
 
 MEGABYTE = 1 << 20
 
@@ -143,3 +148,115 @@ def test_names_that_are_no_text_are_read(tmp_path):
     with open(os.fsencode(folder) + b"/\xff.db3", "wb"):  # noqa: PTH123
         pass
     assert len(digest(folder)) == 40
+
+
+@pytest.fixture
+def database(tmp_path):
+    """A database whose second half is only in its log, as a killed recorder leaves it."""
+    live = tmp_path / "live.db3"
+    writer = sqlite3.connect(live, isolation_level=None)
+    writer.execute("PRAGMA journal_mode = WAL")
+    writer.execute("CREATE TABLE messages (data BLOB)")
+    writer.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+    writer.execute("INSERT INTO messages VALUES (x'0102')")
+    path = tmp_path / "run.db3"
+    for ending in ("", "-wal"):
+        shutil.copyfile(f"{live}{ending}", f"{path}{ending}")
+    writer.close()
+    return path
+
+
+@pytest.mark.parametrize("ending", ["-wal", "-journal"])
+def test_the_log_beside_a_database_is_part_of_it(database, ending):
+    log = database.with_name(f"{database.name}{ending}")
+    log.write_bytes(b"pages")
+    seen = {digest(database)}
+    log.write_bytes(b"Pages")
+    seen.add(digest(database))
+    log.unlink()
+    seen.add(digest(database))
+    assert len(seen) == 3
+
+
+def test_an_empty_log_is_none(database):
+    log = database.with_name(f"{database.name}-wal")
+    log.unlink()
+    before = digest(database)
+    log.write_bytes(b"")
+    assert digest(database) == before
+
+
+def test_a_database_moved_with_its_log_is_the_same(database, tmp_path):
+    before = digest(database)
+    (tmp_path / "deep").mkdir()
+    for ending in ("", "-wal"):
+        shutil.move(f"{database}{ending}", tmp_path / "deep" / f"other.db3{ending}")
+    assert digest(tmp_path / "deep" / "other.db3") == before
+
+
+def test_what_lies_beside_a_recording_of_another_kind_is_no_part_of_it(recording):
+    before = digest(recording)
+    recording.with_name("run.bag-wal").write_bytes(b"notes")
+    assert digest(recording) == before
+
+
+MERGED = (
+    "a program that opens a database merges the log beside it (-wal): bring back both files as they were, "
+    "or map it anew, with --overwrite"
+)
+
+
+@pytest.mark.parametrize("how", ["log removed", "log merged"])
+def test_a_database_without_the_log_it_had_is_refused(database, how):
+    known = identify(database)
+    assert checked([known], None, None) == [str(database)]
+    if how == "log removed":
+        database.with_name("run.db3-wal").unlink()
+    else:
+        reader = sqlite3.connect(database)
+        assert reader.execute("SELECT count(*) FROM messages").fetchone() == (1,)
+        reader.close()
+        assert not database.with_name("run.db3-wal").exists()
+    with pytest.raises(SessionError) as raised:
+        checked([known], None, None)
+    assert raised.value.message == f"{database} is not the recording the run has read"
+    assert raised.value.hint == MERGED
+
+
+@pytest.fixture
+def ring(tmp_path):
+    path = tmp_path / "ring.yaml"
+    path.write_text("angle_deg: 15\n")
+    return path
+
+
+@pytest.mark.parametrize("how", ["changed", "gone"])
+def test_a_ring_of_sonars_that_is_not_what_it_was_is_refused(recording, ring, tmp_path, how):
+    with Session.create(tmp_path / "a.db", [recording], None, SourceOptions(sonar_ring=ring)) as session:
+        assert session.check_recordings() == [str(recording)]
+    with Session.open(tmp_path / "a.db") as session:
+        assert session.options.sonar_ring == str(ring)
+        assert session.check_recordings() == [str(recording)]
+        if how == "gone":
+            ring.unlink()
+        else:
+            ring.write_text("angle_deg: 25\n")
+        with pytest.raises(SessionError) as raised:
+            session.check_recordings()
+    assert raised.value.message == (
+        f"cannot read {ring}: No such file or directory"
+        if how == "gone"
+        else f"{ring} is not the ring of sonars that the run has read"
+    )
+    assert raised.value.hint == "bring it back as it was, or map it anew, with --overwrite"
+
+
+def test_a_ring_of_sonars_that_is_shipped_is_known_by_its_name(recording, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pioneer-3dx").write_text("a file of this name is not what is meant")
+    options = SourceOptions(sonar_ring="pioneer-3dx")
+    with Session.create(tmp_path / "a.db", [recording], None, options):
+        pass
+    with Session.open(tmp_path / "a.db") as session:
+        assert session.options.sonar_ring == "pioneer-3dx"
+        assert session.check_recordings() == [str(recording)]

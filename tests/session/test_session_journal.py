@@ -1,6 +1,7 @@
 """The journal of a run: what is kept, when it is written, and what a later run recalls."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -119,6 +120,72 @@ def test_a_run_that_goes_on_adds_to_what_is_known(path, opened):
     third = opened(path)
     assert differences([outcome(0), outcome(1)], known_scans(third)) == []
     assert differences([[closure(0)], [closure(1), closure(2)]], [*iter(third.recall_round, None)]) == []
+
+
+def reopened(path, opened):
+    """A journal that knows two scans, the second a node, and a round of two searches."""
+    first = opened(path)
+    first.keep_scan(7.0, outcome(0), None)
+    first.keep_scan(7.1, outcome(1, is_node=True), node(0))
+    first.keep_round([closure(0), closure(1)])
+    first.flush()
+    first._database.close()
+    return opened(path)
+
+
+def test_what_is_recalled_is_confirmed_by_what_comes(path, opened):
+    later = reopened(path, opened)
+    later.recall_scan()
+    later.confirm_scan(7.0, 90, None)
+    later.recall_scan()
+    nearly = node(0)
+    later.confirm_scan(7.1, 91, replace(nearly, returns=nearly.returns + np.float32(1e-6)))
+    later.confirm_end()
+    later.recall_round()
+    later.confirm_round(range(60, 62))
+
+
+OTHERS = {
+    "stamp": ((7.0625, 91, node(0)), "scan 1 is of 7.062500 s, and was of 7.100000 s"),
+    "returns": ((7.1, 80, node(0)), "scan 1 has 80 returns, and had 91"),
+    "no node": ((7.1, 91, None), "scan 1 does not add to the map, unlike before"),
+    "points": ((7.1, 91, node(1)), "scan 1 has other returns"),
+    "fewer points": ((7.1, 91, replace(node(0), returns=node(0).returns[:2])), "scan 1 has other returns"),
+    "ghosts": ((7.1, 91, replace(node(0), ghosts=node(0).returns)), "scan 1 has other returns"),
+}
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_another_scan_in_the_place_of_one_that_is_known(path, opened, what):
+    later = reopened(path, opened)
+    later.recall_scan()
+    later.recall_scan()
+    now, told = OTHERS[what]
+    with pytest.raises(SessionError) as raised:
+        later.confirm_scan(*now)
+    assert raised.value.message == f"the recording is not what it was when the run began: {told}"
+
+
+def test_a_node_where_there_was_none(path, opened):
+    later = reopened(path, opened)
+    later.recall_scan()
+    with pytest.raises(SessionError, match="scan 0 adds to the map, unlike before"):
+        later.confirm_scan(7.0, 90, node(0))
+
+
+def test_an_end_before_all_that_is_known(path, opened):
+    later = reopened(path, opened)
+    later.recall_scan()
+    with pytest.raises(SessionError, match="it ends after 1 of the 2 scans known of it"):
+        later.confirm_end()
+
+
+@pytest.mark.parametrize(("nodes", "other"), [(range(61), 61), (range(61, 90), 60)])
+def test_searches_that_were_made_for_other_nodes(path, opened, nodes, other):
+    later = reopened(path, opened)
+    later.recall_round()
+    with pytest.raises(SessionError, match=f"round 0 of searches was made for node {other}, which is not"):
+        later.confirm_round(nodes)
 
 
 def test_it_is_written_about_once_a_second(path, opened, clock, tmp_path):

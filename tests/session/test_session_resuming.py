@@ -85,7 +85,7 @@ def test_a_working_directory_with_something_else_is_left_alone(bag, target, caps
     shutil.rmtree(partial)
     (partial / "notes").mkdir(parents=True)
     assert tried(capsys, bag, "-o", target) == (
-        1, f"{partial} holds what is no result: notes (choose another directory)",
+        1, f"{partial} holds what is no result: notes (move it away, or choose another directory)",
     )  # fmt: skip
     assert (partial / "notes").is_dir()
 
@@ -130,7 +130,7 @@ def test_a_recording_that_has_changed_is_refused(own_recording, tmp_path, capsys
     own_recording.write_bytes(content)
     capsys.readouterr()
     assert tried(capsys, "--resume", tmp_path / "run") == (
-        1, f"{own_recording} is not the recording the run has read (map it anew)",
+        1, f"{own_recording} is not the recording the run has read (map it anew, with --overwrite)",
     )  # fmt: skip
     assert (tmp_path / "run.partial" / "session.db").exists()
 
@@ -168,7 +168,7 @@ def test_a_run_of_another_version_is_refused(target, capsys, monkeypatch):
 
 OTHER_OPTIONS = [
     "-o x", "--config x.yaml", "--set map.resolution=0.1", "--sensor ust10lx", "--calibration x",
-    "--require-intensity", "--overwrite", "--scan-topic /a", "--odom-topic /a", "--imu-topic /a",
+    "--require-intensity", "--scan-topic /a", "--odom-topic /a", "--imu-topic /a",
     "--sonar x.txt", "--sonar-topic /a", "--points-topic /a", "--sonar-ring pioneer-3dx",
     "--laser-pose 0,0,0", "--start 1", "--duration 1", "--every 2", "--echo last", "--strict",
 ]  # fmt: skip
@@ -190,7 +190,9 @@ def test_every_option_of_map_is_among_them():
 
     said = {option.split()[0].lstrip("-").replace("-", "_") for option in OTHER_OPTIONS}
     said = said - {"o", "set"} | {"output", "assignments"}
-    assert said == set(inspect.signature(map_command).parameters) - {"recordings", "resume", "json", "quiet"}
+    assert said == set(inspect.signature(map_command).parameters) - {
+        "recordings", "resume", "overwrite", "json", "quiet"
+    }  # fmt: skip
 
 
 def test_nobody_else_may_write_there_meanwhile(target, whole, capsys):

@@ -102,7 +102,8 @@ def test_the_second_signal_ends_at_once(words, whole, old, tmp_path, capsys, num
     assert capsys.readouterr().err == (
         f"error: interrupted (go on: glassslam map --resume {tmp_path / 'run'})\n"
     )
-    assert {path.name for path in (tmp_path / "run.partial").iterdir()} <= {"session.db", "session.db-wal"}
+    kept = {"session.db", "session.db-wal", "session.db.overwrite"}
+    assert {path.name for path in (tmp_path / "run.partial").iterdir()} <= kept
     assert old.read_text() == "old"
     assert go_on(tmp_path / "run") == 0
     assert_same_results(tmp_path / "run", whole)

@@ -80,6 +80,15 @@ def test_simulate_refuses_what_it_does_not_know(words, message, tmp_path, capsys
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("name", ["room.mcap", "room", "."])
+def test_simulate_writes_bags_under_names_of_bags_only(name, room, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", str(room), "-o", name]) == 2
+    words = f"error: -o {name}: a ROS 1 bag is written (give it a name that ends in .bag)\n"
+    assert capsys.readouterr().err == words
+    assert list(tmp_path.iterdir()) == [room]
+
+
 def test_demo_does_not_mix_with_other_files(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("precious")
     assert main(["demo", "-o", str(tmp_path)]) == 1

@@ -1,5 +1,6 @@
 import hashlib
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,6 +111,44 @@ def test_progress_is_told_in_recorded_seconds(simulation, tmp_path):
     write_recording(simulation, tmp_path / "room.bag", told.append)
     assert told[0] == pytest.approx(0.0)
     assert told[-1] == pytest.approx(simulation.motion.times[-1], abs=0.5)
+
+
+class Killed(BaseException):
+    """Ends everything at once."""
+
+
+def test_no_bag_ever_stands_beside_the_truth_of_another(simulation, tmp_path, monkeypatch):
+    bag = write_recording(simulation, tmp_path / "room.bag").bag
+    before, beside = bag.read_bytes(), []
+
+    def watched(unlink, path, **more):
+        beside.append(bag.read_bytes() == before)
+        unlink(path, **more)
+
+    def killed(*_):
+        raise Killed
+
+    unlink = Path.unlink
+    monkeypatch.setattr(Path, "unlink", lambda path, **more: watched(unlink, path, **more))
+    monkeypatch.setattr("glassslam.simulation.recording.write_truth", killed)
+    with pytest.raises(Killed):
+        write_recording(simulate(scene(laser_pose=LASER), "rplidar", seed=8), bag)
+    truths = len(truth_paths(bag))
+    assert beside[: truths + 1] == [True] * (truths + 1)  # what a killed run has left, and every truth
+    assert bag.read_bytes() != before
+    assert list(tmp_path.iterdir()) == [bag]
+
+
+def test_a_recording_that_fails_keeps_the_bag_and_its_truth(simulation, tmp_path):
+    bag = write_recording(simulation, tmp_path / "room.bag").bag
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def breaks(_seconds):
+        raise Killed
+
+    with pytest.raises(Killed):
+        write_recording(simulate(scene(laser_pose=LASER), "rplidar", seed=8), bag, breaks)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_an_interrupted_recording_leaves_nothing_behind(simulation, tmp_path):

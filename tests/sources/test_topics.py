@@ -128,11 +128,11 @@ def test_odometry_switched_off(bag):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"start": -1.0}, "start must be a time of 0 s or more, not -1"),
+        ({"start": -1.0}, "^--start must be a time of 0 s or more, not -1"),
         ({"start": float("nan")}, "start must be a time of 0 s or more, not nan"),
-        ({"duration": 0.0}, "duration must be a time above 0 s, not 0"),
-        ({"every": 0}, "every must be 1 or more, not 0"),
-        ({"echo": "best"}, "unknown echo 'best'"),
+        ({"duration": 0.0}, "^--duration must be a time above 0 s, not 0"),
+        ({"every": 0}, "^--every must be 1 or more, not 0"),
+        ({"echo": "best"}, "^--echo: unknown echo 'best'"),
         ({"laser_pose": (1.0, float("inf"), 0.0)}, "laser pose must be three finite numbers"),
         ({"scan_topic": "none"}, "a map needs scans: the scan topic cannot be 'none'"),
     ],
