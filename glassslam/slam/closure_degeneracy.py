@@ -8,6 +8,7 @@ import numpy as np
 
 from glassslam.geometry import between
 from glassslam.slam.degeneracy import Trace, in_order, scan_degeneracies
+from glassslam.slam.motion_degeneracy import motion_degeneracies
 from glassslam.slam.rejoin import joined
 from glassslam.slam.result import Degeneracy
 from glassslam.slam.search_outcome import SearchOutcome
@@ -25,7 +26,8 @@ def find_degeneracies(trace: Trace) -> list[Degeneracy]:
     trace : Trace
         The run.
     """
-    return in_order([*scan_degeneracies(trace), *break_degeneracies(trace), *closure_degeneracies(trace)])
+    every = scan_degeneracies, motion_degeneracies, break_degeneracies, closure_degeneracies
+    return in_order(one for kind in every for one in kind(trace))
 
 
 def break_degeneracies(trace: Trace) -> Iterator[Degeneracy]:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.records import FloatArray
+from glassslam.slam.degeneracy_words import scans_of, times
+from glassslam.slam.motion_watch import MotionReport
 from glassslam.slam.result import Degeneracy
 from glassslam.slam.search_outcome import SearchOutcome
 from glassslam.slam.tracking import Event, How, MatchArrays
@@ -19,21 +21,6 @@ from glassslam.slam.tracking import Event, How, MatchArrays
 _LEAST_HOLD, _LEAST_SLIDE, _SMALL_GAP = 0.05, 2.0, 0.5
 _LOW_OVERLAP, _POOR_RESIDUAL, _LASTING_SCANS = 0.4, 0.55, 5
 _SAME_PLACE = 3.0
-_SUMMARIES = (
-    (("featureless",), "{where} could slide along a featureless corridor"),
-    (("low overlap", "poor fit"), "{where} fit the map badly"),
-    (("lost",), "tracking was lost and found again, {times}"),
-    (
-        ("clock jump", "silence"),
-        "the recording breaks off {times}; what follows is joined with what was before",
-    ),
-    (
-        ("clock jump, not rejoined", "silence, not rejoined"),
-        "the recording breaks off {times}, and the map is in pieces that may be drawn over each other:"
-        " how they lie is a guess",
-    ),
-    (("closure rejected",), "{where} passed places known from before without recognising them"),
-)
 
 
 @dataclass(frozen=True)
@@ -58,6 +45,8 @@ class Trace:
         Nodes of the closures in use, and of those that did not fit.
     with_odometry : bool
         Whether the recording has odometry.
+    motion : MotionReport
+        What told how the robot moved; None: odometry did, all the way.
     """
 
     stamps: FloatArray
@@ -70,6 +59,7 @@ class Trace:
     used: NDArray[np.int64]
     taken_out: NDArray[np.int64]
     with_odometry: bool = True
+    motion: MotionReport | None = None
 
     @cached_property
     def travelled(self) -> FloatArray:
@@ -95,6 +85,12 @@ class Trace:
             text=text,
         )
 
+    def map_heading(self, scans: NDArray[np.int64], headings: FloatArray) -> float:
+        """Mean of directions (k,) in the local frame, in the map, deg in [0, 180): back and forth are one."""
+        doubled = 2.0 * (headings + self.final[scans, 2] - self.local[scans, 2])
+        mean = 0.5 * math.atan2(float(np.sin(doubled).sum()), float(np.cos(doubled).sum()))
+        return round(math.degrees(mean) % 180.0) % 180
+
     def runs(self, flags: NDArray[np.bool_], gap: float) -> Iterator[tuple[int, int]]:
         """First and last of flagged scans that follow each other within `gap` m of travel, breaks apart."""
         stretch = np.cumsum(self.is_first)
@@ -116,7 +112,7 @@ def scan_degeneracies(trace: Trace) -> list[Degeneracy]:
         The run.
     """
     found = [
-        *_featureless(trace),
+        *featureless(trace),
         *_unmatched(trace),
         *_low_overlap(trace),
         *_poor_fit(trace),
@@ -131,26 +127,14 @@ def in_order(found: Iterable[Degeneracy]) -> list[Degeneracy]:
     return sorted(found, key=lambda one: (one.first_scan, one.last_scan, one.kind))
 
 
-def summarised(found: Sequence[Degeneracy]) -> list[str]:
-    """One line for every kind of stretch that makes a map less certain.
+def featureless(trace: Trace) -> Iterator[Degeneracy]:
+    """Bare corridors: the direction that walls do not hold is that in which the robot drives.
 
     Parameters
     ----------
-    found : sequence of Degeneracy
-        Stretches of a run.
+    trace : Trace
+        The run.
     """
-    lines = []
-    for kinds, words in _SUMMARIES:
-        those = [one for one in found if one.kind in kinds]
-        if those:
-            count, metres = len(those), sum(one.length for one in those)
-            where = f"{count} stretch{'es' * (count != 1)}, {metres:.0f} m,"
-            lines.append(f"{words.format(where=where, times=_times(count))}: see report")
-    return lines
-
-
-def _featureless(trace: Trace) -> Iterator[Degeneracy]:
-    """Bare corridors: the direction that walls do not hold is that in which the robot drives."""
     matches = trace.matches
     flags = (matches.points > 0) & (matches.hold < _LEAST_HOLD)
     along = _travel(trace.local, trace.is_first, matches.free_heading)
@@ -159,7 +143,8 @@ def _featureless(trace: Trace) -> Iterator[Degeneracy]:
         length = along[last] - along[first]
         if length < _LEAST_SLIDE:
             continue
-        heading = _map_heading(trace, np.flatnonzero(flags[first : last + 1]) + first)
+        found = np.flatnonzero(flags[first : last + 1]) + first
+        heading = trace.map_heading(found, matches.free_heading[found])
         yield trace.told(
             "featureless",
             first,
@@ -173,7 +158,7 @@ def _unmatched(trace: Trace) -> Iterator[Degeneracy]:
     for first, last in trace.runs(flags, _SMALL_GAP):
         count = int(flags[first : last + 1].sum())
         yield trace.told(
-            "unmatched", first, last, f"{_scans(count)} with too few returns: poses are predictions"
+            "unmatched", first, last, f"{scans_of(count)} with too few returns: poses are predictions"
         )
 
 
@@ -187,7 +172,7 @@ def _low_overlap(trace: Trace) -> Iterator[Degeneracy]:
                 "low overlap",
                 first,
                 last,
-                f"{_scans(count)} saw little of the map, at least {least:.0%} of it",
+                f"{scans_of(count)} saw little of the map, at least {least:.0%} of it",
             )
 
 
@@ -198,7 +183,7 @@ def _poor_fit(trace: Trace) -> Iterator[Degeneracy]:
     for first, last in trace.runs(flags, _SMALL_GAP):
         count, worst = int(flags[first : last + 1].sum()), float(matches.residual[first : last + 1].max())
         if count >= _LASTING_SCANS:
-            text = f"{_scans(count)} fit the map badly: residual up to {worst:.2f}, usual is {usual:.2f}"
+            text = f"{scans_of(count)} fit the map badly: residual up to {worst:.2f}, usual is {usual:.2f}"
             yield trace.told("poor fit", first, last, text)
 
 
@@ -207,7 +192,7 @@ def _lost(trace: Trace) -> Iterator[Degeneracy]:
     for first, last in trace.runs(flags, _SAME_PLACE):
         count = int(flags[first : last + 1].sum())
         yield trace.told(
-            "lost", first, last, f"tracking was lost and found again {_times(count)} by search in the submap"
+            "lost", first, last, f"tracking was lost and found again {times(count)} by search in the submap"
         )
 
 
@@ -216,7 +201,7 @@ def _odometry_jumps(trace: Trace) -> Iterator[Degeneracy]:
     for first, last in trace.runs(flags, _SAME_PLACE):
         count = int(flags[first : last + 1].sum())
         yield trace.told(
-            "odometry jump", first, last, f"the odometry jumped {_times(count)}: the step is not used"
+            "odometry jump", first, last, f"the odometry jumped {times(count)}: the step is not used"
         )
 
 
@@ -228,19 +213,3 @@ def _travel(poses: FloatArray, is_first: NDArray[np.bool_], heading: FloatArray 
     else:
         lengths = np.abs(steps[:, 0] * np.cos(heading) + steps[:, 1] * np.sin(heading))
     return np.cumsum(np.where(is_first, 0.0, lengths))
-
-
-def _map_heading(trace: Trace, scans: NDArray[np.int64]) -> float:
-    """Mean direction that scans leave free, in the map, deg in [0, 180): back and forth are one."""
-    turned = trace.final[scans, 2] - trace.local[scans, 2]
-    doubled = 2.0 * (trace.matches.free_heading[scans] + turned)
-    mean = 0.5 * math.atan2(float(np.sin(doubled).sum()), float(np.cos(doubled).sum()))
-    return round(math.degrees(mean) % 180.0) % 180
-
-
-def _scans(count: int) -> str:
-    return f"{count} scan{'s' * (count != 1)}"
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

@@ -53,8 +53,9 @@ class Degeneracy:
     Attributes
     ----------
     kind : str
-        "featureless", "unmatched", "low overlap", "poor fit", "lost", "odometry jump", "clock jump" or
-        "silence" (with ", not rejoined" where the map is in pieces), "closure rejected",
+        "featureless", "featureless, no odometry", "odometry stuck", "motion missed",
+        "odometry contradicted", "unmatched", "low overlap", "poor fit", "lost", "odometry jump",
+        "clock jump" or "silence" (with ", not rejoined" where the map is in pieces), "closure rejected",
         "closure inconsistent", "closure ambiguous" or "closure taken out".
     first_scan, last_scan : int
         Numbers of the scans in the trajectory.

@@ -6,13 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glassslam.posegraph.storage import LOOP
-from glassslam.records import LaserScan
+from glassslam.records import FloatArray, LaserScan
 from glassslam.slam.closure_degeneracy import find_degeneracies
-from glassslam.slam.degeneracy import Trace, summarised
+from glassslam.slam.degeneracy import Trace
+from glassslam.slam.degeneracy_words import summarised
 from glassslam.slam.extrapolator import PoseExtrapolator
 from glassslam.slam.glass_choice import DetectorChoice
 from glassslam.slam.global_slam import GlobalSlam
 from glassslam.slam.local import LocalSlam
+from glassslam.slam.motion_watch import MotionWatch
 from glassslam.slam.rejoin import beginnings
 from glassslam.slam.result import RunStatistics
 from glassslam.slam.trajectory import PoseTracks
@@ -43,12 +45,20 @@ class Tally:
     without_odometry: int = 0
     returns: int = 0
     stamps: list[float] = field(default_factory=list)
+    motion: MotionWatch = field(default_factory=MotionWatch)
 
-    def place(self, scan: LaserScan, returns: int, *, with_odometry: bool) -> None:
-        """Count a scan that was given a pose."""
+    def place(
+        self,
+        scan: LaserScan,
+        returns: int,
+        odometry_pose: FloatArray | None,
+        found_pose: FloatArray | None = None,
+    ) -> None:
+        """Count a scan that was given a pose, with that of the odometry at it, if it is known."""
         self.stamps.append(scan.stamp)
         self.returns += returns
-        self.without_odometry += not with_odometry
+        self.without_odometry += odometry_pose is None
+        self.motion.add(scan, odometry_pose, found_pose)
 
     def excuse(self) -> str:
         """What came in, for a run that has nothing to show."""
@@ -65,7 +75,7 @@ def run_statistics(
     tracks: PoseTracks,
 ) -> RunStatistics:
     """Everything the report tells of a finished run."""
-    found = find_degeneracies(_trace(extrapolator, local, world, tracks))
+    found = find_degeneracies(_trace(tally, extrapolator, local, world, tracks))
     used, taken_out = world.closures()
     rejected = dict(sorted(world.rejected.items()))
     if taken_out:
@@ -97,7 +107,9 @@ def run_statistics(
     )
 
 
-def _trace(extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam, tracks: PoseTracks) -> Trace:
+def _trace(
+    tally: Tally, extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam, tracks: PoseTracks
+) -> Trace:
     edges = world.graph.edges
     is_loop = edges.kinds == LOOP
     return Trace(
@@ -111,6 +123,7 @@ def _trace(extrapolator: PoseExtrapolator, local: LocalSlam, world: GlobalSlam, 
         used=edges.ends[is_loop & edges.enabled],
         taken_out=edges.ends[is_loop & ~edges.enabled],
         with_odometry=len(extrapolator.odometry) > 0,
+        motion=tally.motion.report(),
     )
 
 

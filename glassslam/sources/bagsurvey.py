@@ -1,9 +1,10 @@
 """What must be known of bags before their records can be streamed: topics, frames, the no-echo value."""
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -14,6 +15,7 @@ from glassslam.errors import UsageError
 from glassslam.records import FloatArray
 from glassslam.sources.bag import MULTI_ECHO, Bag, Topic, merge_topics
 from glassslam.sources.bagsonar import plan_sonar
+from glassslam.sources.deadodometry import dead_warning, is_dead, poses_of
 from glassslam.sources.failures import reading
 from glassslam.sources.frames import edge_name, guess_base, odometry_edge, read_tree
 from glassslam.sources.messages import Mount
@@ -39,6 +41,7 @@ _SCANS_PER_WINDOW = 20
 # Some way apart, lest a standing robot shows the same scan again and again.
 _STRIDE = 5
 _IMU_SAMPLES = 50
+_EVENLY = 128
 _TILT_NOTED = np.radians(10.0)
 
 
@@ -137,6 +140,7 @@ class _Surveyor:
         tree = read_tree(self._bags, choice.transforms, wanted)
         edge = odometry_edge(tree, choice)
         base = base or (edge.child if edge else guess_base(tree, laser))
+        choice, edge = self._without_dead_odometry(choice, edge)
         matrix = self._base_from_laser(tree, base, laser)
         no_echo = detect_no_echo(self._sample_ranges(choice.scan))
         base_from_imu = tree.lookup(base, imu) if imu else None
@@ -191,7 +195,20 @@ class _Surveyor:
         if any(rate.x or rate.y or rate.z for rate in rates):
             return choice
         self._warnings.append(f"{choice.imu.name} is not used: its angular velocity is always zero")
-        return Choice(choice.scan, choice.odometry, None, choice.transforms, choice.odometry_from_tf)
+        return replace(choice, imu=None)
+
+    def _without_dead_odometry(self, choice: Choice, edge: Edge | None) -> tuple[Choice, Edge | None]:
+        """Odometry that stands still all the time while the robot drives is worse than none."""
+        moving = [topic for topic in choice.transforms if edge is not None and topic.name == edge.topic]
+        topic = next(iter(moving), choice.odometry)
+        if topic is None or self._options.odom_topic is not None:
+            return choice, edge
+        some = poses_of(self._samples(topic, _SCANS_PER_WINDOW), edge)
+        every = poses_of(self._evenly(topic), edge)  # records may all bear the same time
+        if not is_dead(itertools.chain(some, every), lambda: self._evenly(choice.scan)):
+            return choice, edge
+        self._warnings.append(dead_warning(topic.name if edge is None else edge_name(edge)))
+        return replace(choice, odometry=None, odometry_from_tf=None), None
 
     def _base_from_laser(self, tree: TransformTree, base: str, laser: str) -> FloatArray:
         matrix = tree.lookup(base, laser)
@@ -221,12 +238,25 @@ class _Surveyor:
                 start = bag.start + round(k * length)
                 yield from self._sample(bag, topic, count, start, start + round(length) + 1)
 
+    def _evenly(self, topic: Topic) -> Iterator[Any]:
+        """Messages from all over the recording, whatever their times: all of it is read."""
+        for bag in self._bags:
+            stride = max(1, math.ceil(sum(t.count for t in bag.topics if t.name == topic.name) / _EVENLY))
+            yield from self._sample(bag, topic, _EVENLY, bag.start, stride=stride)
+
     def _first(self, topic: Topic) -> Any:
         """The first readable message of a topic, or None."""
         return next((m for bag in self._bags for m in self._sample(bag, topic, 1, bag.start)), None)
 
     def _sample(
-        self, bag: Bag, topic: Topic, count: int, start: int, stop: int | None = None
+        self,
+        bag: Bag,
+        topic: Topic,
+        count: int,
+        start: int,
+        stop: int | None = None,
+        *,
+        stride: int = _STRIDE,
     ) -> Iterator[Any]:
         """Readable messages of a topic from a record time on, some way apart."""
         found = next((t for t in bag.topics if (t.name, t.msgtype) == (topic.name, topic.msgtype)), None)
@@ -234,7 +264,7 @@ class _Surveyor:
             return
         decode = scan_decoder(bag, found, self._options.echo)
         with closing(bag.messages([found], start, stop)) as messages:
-            for _, _, raw in itertools.islice(messages, 0, count * _STRIDE, _STRIDE):
+            for _, _, raw in itertools.islice(messages, 0, count * stride, stride):
                 try:
                     yield decode(raw)
                 except Exception:  # noqa: S112  (counted when the record is due)

@@ -21,6 +21,7 @@ from glassslam.sources.carmenlines import (
     parse_laser,
     parse_odom,
 )
+from glassslam.sources.deadodometry import dead_warning, is_dead
 from glassslam.sources.formats import Piece
 from glassslam.sources.messages import UnusableMessageError
 from glassslam.sources.noecho import NoEcho, detect_no_echo
@@ -231,11 +232,16 @@ class _Surveyor:
                 raise UsageError(f"odom topic {wish} is not in the log; candidates: {', '.join(known)}")
             return wish
         poses = np.array([line.robot_pose for line in lines])
-        moves = bool(np.all(np.isfinite(poses)) and np.any(poses != poses[0]))
-        if moves or not has_odom:
-            return laser if np.all(np.isfinite(poses)) else ""
+        is_finite = bool(np.all(np.isfinite(poses)))
+        if is_finite and np.any(poses != poses[0]):
+            return laser
         odom = [pose for _, _, pose in self._readable(self._samples[ODOM].some, self._parse_odom)]
-        return ODOM if any(pose != odom[0] for pose in odom) else laser
+        if any(pose != odom[0] for pose in odom):
+            return ODOM
+        if is_finite and is_dead([line.robot_pose for line in lines], lambda: lines):
+            self._warnings.append(dead_warning(f"the odometry in {laser} lines"))
+            return ""
+        return laser if is_finite or has_odom else ""
 
     def _parse_odom(self, line: bytes) -> tuple[float, float, Pose]:
         return parse_odom(line, self._reader)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from glassslam.slam.closure_degeneracy import find_degeneracies
-from glassslam.slam.degeneracy import Trace, summarised
+from glassslam.slam.degeneracy import Trace
+from glassslam.slam.degeneracy_words import summarised
 from glassslam.slam.search_outcome import SearchOutcome
 from glassslam.slam.tracking import Event, How, MatchArrays
 

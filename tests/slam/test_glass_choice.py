@@ -65,6 +65,17 @@ def test_a_detector_asked_for_that_cannot_work_is_a_warning():
     assert choice.warnings == ["glass is not looked for: the recording has no intensities"]
 
 
+@pytest.mark.parametrize("given", [{"sensor": "utm30lx"}, {}])
+def test_beams_too_far_apart_for_the_detector_asked_for_are_a_warning(given):
+    choice = settled(walls(COARSE, count=12), detector="calibrated_peak", **given)
+    assert choice.name == "calibrated_peak"
+    assert choice.warnings == [
+        "glass can hardly be found: beams 1 deg apart are too few for a peak, "
+        "calibrated_peak needs 0.75 deg or less (see glass.detector)"
+    ]
+    assert settled(walls(FINE, count=12), detector="calibrated_peak", **given).warnings == []
+
+
 def test_required_intensities_that_are_not_there_are_an_error():
     with pytest.raises(RecordingError) as caught:
         settled([scan(np.ones(100), (), FINE)], require_intensity=True)

@@ -233,7 +233,7 @@ class TestOddRecordings:
 
     def test_odometry_that_is_reset_is_survived_and_told(self, plain):
         records = [
-            replace(record, pose=(record.pose[0] + 500.0, 9.0, 1.0))
+            replace(record, pose=(record.pose[0] + 500.0, record.pose[1] + 9.0, record.pose[2]))
             if isinstance(record, Odometry) and record.stamp > 106.0
             else record
             for record in plain

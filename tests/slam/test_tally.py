@@ -10,8 +10,8 @@ SCAN = LaserScan(4.5, np.ones(3, dtype=np.float32), 0.0, 0.1, 0.1, 10.0)
 
 def test_scans_placed_are_counted():
     tally = Tally()
-    tally.place(SCAN, 3, with_odometry=True)
-    tally.place(SCAN, 2, with_odometry=False)
+    tally.place(SCAN, 3, np.zeros(3))
+    tally.place(SCAN, 2, None)
     assert tally.stamps == [4.5, 4.5]
     assert tally.returns == 5
     assert tally.without_odometry == 1

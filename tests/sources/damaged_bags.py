@@ -6,7 +6,7 @@ from tiny_bags import lone_file, odom, scan, write_ros1, write_ros2
 
 from glassslam.sources import SourceOptions, open_recording
 
-DRIVE = [message for k in range(60) for message in (odom(k / 10), scan(k / 10, [1.0 + k] * 50))]
+DRIVE = [message for k in range(60) for message in (odom(k / 10, 0.1 * k), scan(k / 10, [1.0 + k] * 50))]
 
 WHOLE = {
     "ROS1": lambda folder: write_ros1(folder / "whole.bag", DRIVE, chunk_bytes=2000),

@@ -23,7 +23,7 @@ from glassslam.sources.unpacking import LARGEST_CHUNK
 from glassslam.sources.windows import BytesWindow
 
 # Several chunks of 1 MB, and rows on many pages.
-LONG = [m for k in range(300) for m in (odom(k / 10), scan(k / 10, [1.0 + k] * 4000))]
+LONG = [m for k in range(300) for m in (odom(k / 10, 0.1 * k), scan(k / 10, [1.0 + k] * 4000))]
 
 
 @pytest.fixture(scope="module")

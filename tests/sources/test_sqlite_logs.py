@@ -18,7 +18,7 @@ from glassslam.sources.inspection import inspect_recording
 from glassslam.sources.sqlite_kernels import wal_checksum
 from glassslam.sources.sqlitepages import overlay_of
 
-LONG = [m for k in range(60) for m in (odom(k / 10), scan(k / 10, [1.0 + k] * 2000))]
+LONG = [m for k in range(60) for m in (odom(k / 10, 0.1 * k), scan(k / 10, [1.0 + k] * 2000))]
 EARLY, ALL = 20, len(LONG)
 
 
