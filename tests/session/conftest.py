@@ -1,7 +1,7 @@
 """The recording that most tests of sessions map, and two runs of it: a whole one and an interrupted one."""
 
 import pytest
-from session_worlds import WORDS, interrupted, results, write_ring
+from session_worlds import PATH, SHORT, WORDS, interrupted, results, write_ring
 
 from glassslam.cli import main
 
@@ -30,3 +30,17 @@ def partial_run(bag, tmp_path_factory):
     folder = tmp_path_factory.mktemp("partial") / "run"
     assert interrupted(["map", str(bag), "-o", str(folder), *WORDS], 150) == 130
     return folder.with_name("run.partial")
+
+
+@pytest.fixture(scope="session")
+def small_bag(tmp_path_factory):
+    """A few scans of that ring."""
+    return write_ring(tmp_path_factory.mktemp("small") / "small.bag", PATH[:30])
+
+
+@pytest.fixture(scope="session")
+def small_whole(small_bag, tmp_path_factory):
+    """The results of a whole run over them."""
+    target = tmp_path_factory.mktemp("small_whole") / "run"
+    assert main(["map", str(small_bag), "-o", str(target), *SHORT]) == 0
+    return results(target)

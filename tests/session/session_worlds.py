@@ -45,6 +45,8 @@ WORDS = [
     *("--set", "loop_closure.min_node_gap=40", "--set", "loop_closure.sampling_stride=2"),
     *("--set", "glass.detector=intensity_peak", "--set", "glass.scheme=local", "--quiet"),
 ]
+SHORT = ["--set", "glass.detector=off", "--quiet"]
+"""Options of runs over a few scans."""
 """Submaps and rounds of searches as small as the run."""
 
 

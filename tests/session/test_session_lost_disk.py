@@ -7,27 +7,14 @@ import os
 import sqlite3
 
 import pytest
-from session_worlds import PATH, assert_same_results, results, write_ring
+from session_worlds import SHORT, assert_same_results
 
 from glassslam.cli import main
 from glassslam.errors import RecordingError, UnreachableRecordingError
 from glassslam.sources import rosbag1, sqlitestorage
 from glassslam.sources.failures import reading
 
-SHORT = ["--set", "glass.detector=off", "--quiet"]
 LOST = [errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT, errno.ENOENT, errno.ENOTCONN]
-
-
-@pytest.fixture(scope="module")
-def small_bag(tmp_path_factory):
-    return write_ring(tmp_path_factory.mktemp("small") / "small.bag", PATH[:30])
-
-
-@pytest.fixture(scope="module")
-def expected(small_bag, tmp_path_factory):
-    target = tmp_path_factory.mktemp("expected") / "run"
-    assert main(["map", str(small_bag), "-o", str(target), *SHORT]) == 0
-    return results(target)
 
 
 def fail_while_mapping(monkeypatch, error):
@@ -50,7 +37,7 @@ def fail_while_mapping(monkeypatch, error):
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.ESTALE, errno.EACCES])
-def test_a_run_whose_disk_goes_away_is_kept(small_bag, expected, tmp_path, monkeypatch, capsys, number):
+def test_a_run_whose_disk_goes_away_is_kept(small_bag, small_whole, tmp_path, monkeypatch, capsys, number):
     target = tmp_path / "run"
     fail_while_mapping(monkeypatch, OSError(number, os.strerror(number)))
     go_on = f"(what was done is kept; when it is there again, go on: glassslam map --resume {target})\n"
@@ -62,7 +49,7 @@ def test_a_run_whose_disk_goes_away_is_kept(small_bag, expected, tmp_path, monke
     monkeypatch.undo()
     assert not target.exists()
     assert main(["map", "--resume", str(target), "-q"]) == 0
-    assert_same_results(target, expected)
+    assert_same_results(target, small_whole)
 
 
 def test_a_run_whose_recording_is_damaged_would_fail_again(small_bag, tmp_path, monkeypatch, capsys):

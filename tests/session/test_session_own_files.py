@@ -3,18 +3,10 @@
 import shutil
 
 import pytest
-from session_worlds import PATH, WORDS, assert_same_results, interrupted, results, write_ring
+from session_worlds import SHORT, WORDS, assert_same_results, interrupted, results
 
 from glassslam.cli import main
 from glassslam.cli.workplace import clear_but_session, made_directory
-
-SHORT = ["--set", "glass.detector=off", "--quiet"]
-"""Options of runs over a few scans."""
-
-
-@pytest.fixture(scope="module")
-def small_bag(tmp_path_factory):
-    return write_ring(tmp_path_factory.mktemp("small") / "small.bag", PATH[:30])
 
 
 @pytest.fixture(scope="module")

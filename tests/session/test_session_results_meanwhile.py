@@ -3,24 +3,10 @@
 import shutil
 
 import pytest
-from session_worlds import PATH, assert_same_results, interrupted, results, write_ring
+from session_worlds import SHORT, assert_same_results, interrupted
 
 from glassslam.cli import main
 from glassslam.cli import run as running
-
-SHORT = ["--set", "glass.detector=off", "--quiet"]
-
-
-@pytest.fixture(scope="module")
-def small_bag(tmp_path_factory):
-    return write_ring(tmp_path_factory.mktemp("small") / "small.bag", PATH[:30])
-
-
-@pytest.fixture(scope="module")
-def expected(small_bag, tmp_path_factory):
-    target = tmp_path_factory.mktemp("expected") / "run"
-    assert main(["map", str(small_bag), "-o", str(target), *SHORT]) == 0
-    return results(target)
 
 
 @pytest.fixture
@@ -58,26 +44,26 @@ def finished_too_late(small_bag, target, monkeypatch, capsys):
 
 
 @pytest.mark.usefixtures("finished_too_late")
-def test_a_finished_run_is_not_lost_to_results_that_have_appeared(target, expected, capsys):
+def test_a_finished_run_is_not_lost_to_results_that_have_appeared(target, small_whole, capsys):
     assert main(["map", "--resume", str(target), "-q"]) == 2
     assert capsys.readouterr().err == told(target, finished=True)
     assert main(["render", str(target), "-q"]) == 2  # no word of replacing what somebody else has put there
     assert (target / "map.pgm").read_text() == "of somebody else"
     assert main(["render", str(target), "-o", str(target.with_name("other")), "-q"]) == 0
-    assert_same_results(target.with_name("other"), expected)
+    assert_same_results(target.with_name("other"), small_whole)
     assert (target / "map.pgm").read_text() == "of somebody else"
     assert main(["map", "--resume", str(target), "-q", "--overwrite"]) == 0
-    assert_same_results(target, expected)
+    assert_same_results(target, small_whole)
 
 
 @pytest.mark.usefixtures("finished_too_late")
-def test_it_goes_on_when_they_are_gone(target, expected):
+def test_it_goes_on_when_they_are_gone(target, small_whole):
     shutil.rmtree(target)
     assert main(["map", "--resume", str(target), "-q"]) == 0
-    assert_same_results(target, expected)
+    assert_same_results(target, small_whole)
 
 
-def test_an_interrupted_run_does_not_replace_what_has_come_since(small_bag, target, expected, capsys):
+def test_an_interrupted_run_does_not_replace_what_has_come_since(small_bag, target, small_whole, capsys):
     assert interrupted(["map", str(small_bag), "-o", str(target), *SHORT], 15) == 130
     appear(target)
     capsys.readouterr()
@@ -85,25 +71,25 @@ def test_an_interrupted_run_does_not_replace_what_has_come_since(small_bag, targ
     assert capsys.readouterr().err == told(target, finished=False)
     assert (target / "map.pgm").read_text() == "of somebody else"
     assert main(["map", "--resume", str(target), "-q", "--overwrite"]) == 0
-    assert_same_results(target, expected)
+    assert_same_results(target, small_whole)
 
 
-def test_overwrite_said_once_holds_for_all_that_follows(small_bag, target, expected):
+def test_overwrite_said_once_holds_for_all_that_follows(small_bag, target, small_whole):
     words = ["map", str(small_bag), "-o", str(target), *SHORT, "--overwrite"]
     assert interrupted(words, 10) == 130
     appear(target)
     assert interrupted(["map", "--resume", str(target), "-q"], 20) == 130
     assert (target / "map.pgm").read_text() == "of somebody else"
     assert main(["map", "--resume", str(target), "-q"]) == 0
-    assert_same_results(target, expected)
+    assert_same_results(target, small_whole)
 
 
-def test_overwrite_said_while_going_on_holds_as_well(small_bag, target, expected):
+def test_overwrite_said_while_going_on_holds_as_well(small_bag, target, small_whole):
     assert interrupted(["map", str(small_bag), "-o", str(target), *SHORT], 10) == 130
     appear(target)
     assert interrupted(["map", "--resume", str(target), "-q", "--overwrite"], 20) == 130
     assert main(["map", "--resume", str(target), "-q"]) == 0
-    assert_same_results(target, expected)
+    assert_same_results(target, small_whole)
 
 
 def test_results_put_aside_by_a_killed_run_do_not_come_back_over_those_of_another(small_bag, target, capsys):
