@@ -45,9 +45,9 @@ WORDS = [
     *("--set", "loop_closure.min_node_gap=40", "--set", "loop_closure.sampling_stride=2"),
     *("--set", "glass.detector=intensity_peak", "--set", "glass.scheme=local", "--quiet"),
 ]
+"""Submaps and rounds of searches as small as the run."""
 SHORT = ["--set", "glass.detector=off", "--quiet"]
 """Options of runs over a few scans."""
-"""Submaps and rounds of searches as small as the run."""
 
 
 def write_ring(bag, path=PATH):
