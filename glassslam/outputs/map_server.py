@@ -18,6 +18,7 @@ from glassslam.yamltext import parse_yaml
 OCCUPIED_THRESH = 0.65
 FREE_THRESH = 0.196
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
+_FINEST, _COARSEST, _FARTHEST = 1e-3, 1e3, 1e9
 
 
 def trinary_image(grid: OccupancyMap) -> NDArray[np.uint8]:
@@ -145,6 +146,11 @@ def _read_fields(location: Path) -> dict[str, Any]:
         x, y, yaw = (float(value) for value in fields["origin"])
     except (KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{location}: a value is missing or no number: {error}") from error
+    if not _FINEST <= fields["resolution"] <= _COARSEST:
+        hint = f"expected {_FINEST:g} to {_COARSEST:g} m per cell"
+        raise OutputError(f"{location}: the resolution is {fields['resolution']:g} m", hint)
+    if not all(abs(value) < _FARTHEST for value in (x, y, yaw)):
+        raise OutputError(f"{location}: the origin lies at {x:g}, {y:g}, turned by {yaw:g}")
     return {**fields, "origin": (x, y, yaw)}
 
 

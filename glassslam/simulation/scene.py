@@ -15,8 +15,8 @@ Coordinate = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
 Extent = Annotated[float, Field(ge=1e-3, le=1e3, allow_inf_nan=False)]
 Point = tuple[Coordinate, Coordinate]
 
-# The true map of a larger plan would not fit into memory: 700 m x 700 m.
-LARGEST_PLAN = 490_000.0
+# The true map of a larger plan would take gigabytes: 64 million cells.
+LARGEST_PLAN = 160_000.0
 LONGEST_DRIVE = 4 * 3600.0
 
 
@@ -235,8 +235,13 @@ class Scene(Part):
         places += [point for thing in things for point in thing.at]
         places += [waypoint.at for waypoint in self.drive.waypoints]
         width, depth = (max(p[axis] for p in places) - min(p[axis] for p in places) for axis in (0, 1))
-        if width * depth > LARGEST_PLAN:
-            raise ValueError(f"the plan covers {width:.0f} x {depth:.0f} m, at most {LARGEST_PLAN:.0f} m2")
+        # the true map lies as the robot stands at first: turned by 45 deg a long plan takes most
+        turned = 0.5 * (width + depth) ** 2
+        if turned > LARGEST_PLAN:
+            raise ValueError(
+                f"the plan covers {width:.0f} x {depth:.0f} m, up to {turned:.0f} m2 of map when turned:"
+                f" at most are {LARGEST_PLAN:.0f} m2"
+            )
         return self
 
     def palette(self) -> dict[str, Material]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glassslam.geometry import inverse, transform_points
-from glassslam.records import FloatArray
+from glassslam.records import Float32Array, FloatArray
 from glassslam.simulation.raycast import SegmentGrid
 from glassslam.simulation.sight_kernels import mark_rays
 from glassslam.slam.result import OccupancyMap
@@ -152,7 +152,15 @@ def _outside(walls: Mask, resolution: float) -> Mask:
     radius = 0.5 * _LARGEST_DOOR / resolution
     pad = int(radius) + 2
     wide = np.pad(walls, pad)
-    parts, _ = ndimage.label(ndimage.distance_transform_edt(~wide) > radius)
+    parts, _ = ndimage.label(_distance(~wide) > radius)
     centres = parts == parts[0, 0]
-    near = ndimage.distance_transform_edt(~centres) <= radius
-    return np.asarray(near[pad:-pad, pad:-pad])
+    near = _distance(~centres) <= radius
+    return near[pad:-pad, pad:-pad]
+
+
+def _distance(cells: Mask) -> Float32Array:
+    """Distance of every cell to the nearest one that is not set, cells."""
+    import cv2  # noqa: PLC0415  (only maps need it; takes a fifth of the memory of scipy's)
+
+    exact = cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(exact, dtype=np.float32)

@@ -107,6 +107,18 @@ def test_empty_map_is_refused(tmp_path):
         (lambda text: text.replace("origin", "orgin"), "a value is missing or no number: 'origin'"),
         (lambda text: text.replace("0.65", "high"), "a value is missing or no number"),
         (lambda text: text.replace("0.0]", "1.5]"), r"the map is turned by 1\.5 rad"),
+        *[
+            (
+                lambda text, r=r: re.sub("resolution: .*", f"resolution: {r}", text),
+                "the resolution is ",
+            )
+            for r in ("0", "-0.05", ".inf", ".nan", "1e-300", "1e300")
+        ],
+        (
+            lambda text: text.replace("origin: [", "origin: [1e300, 0.0, 0.0] #"),
+            r"the origin lies at 1e\+300, 0",
+        ),
+        (lambda text: text.replace("0.0]", ".nan]"), "the origin lies at"),
         (lambda text: text.replace("map.pgm", "other.pgm"), "cannot read .*other.pgm: No such file"),
         (lambda text: "image: [", "is not YAML"),
         (lambda text: "- 1", "describes no map"),

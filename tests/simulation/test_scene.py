@@ -146,6 +146,10 @@ def test_the_world_of_these_tests_is_a_room():
     ("change", "message"),
     [
         ({"at": [9000.0, 1.0], "speed": 10.0}, "the plan covers 9000 x 500 m"),
+        (
+            {"at": [100.0, 1.0], "speed": 10.0},
+            "the plan covers 100 x 500 m, up to 180000 m2 of map when turned",
+        ),
         ({"at": [1e6, 1.0]}, "drive.waypoints.1.at.0: Input should be less than or equal to 10000"),
         ({"speed": 1e-7}, "drive: the drive takes "),
         ({"stop": 1e6}, "drive: the drive takes 277.8 h, at most are 4 h"),
