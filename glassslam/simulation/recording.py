@@ -42,7 +42,7 @@ class WrittenRecording:
 def write_recording(
     simulation: Simulation, bag: str | Path, progress: Callable[[float], None] | None = None
 ) -> WrittenRecording:
-    """Write the bag of a simulation and the truth beside it; existing files are replaced.
+    """Write the bag of a simulation and the truth beside it, all or nothing; existing files are replaced.
 
     Parameters
     ----------
@@ -80,5 +80,10 @@ def write_recording(
 
     records = simulation.records(log.add)
     scans = write_rosbag1(records, bag, scene.laser_pose, report, ring, **heights, replacing=forget)
-    truth = write_truth(simulation, bag, log)
+    try:
+        truth = write_truth(simulation, bag, log)
+    except (Exception, KeyboardInterrupt):
+        forget()
+        Path(bag).unlink()
+        raise
     return WrittenRecording(Path(bag), *truth, scans=scans)

@@ -151,6 +151,18 @@ def test_a_recording_that_fails_keeps_the_bag_and_its_truth(simulation, tmp_path
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.parametrize("end", [MemoryError, KeyboardInterrupt, OutputError])
+def test_a_bag_whose_truth_fails_goes_with_it(simulation, tmp_path, monkeypatch, end):
+    def fails(*_):
+        (tmp_path / "room.bag.truth.json").write_text("{}")
+        raise end("no more")
+
+    monkeypatch.setattr("glassslam.simulation.recording.write_truth", fails)
+    with pytest.raises(end):
+        write_recording(simulation, tmp_path / "room.bag")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_interrupted_recording_leaves_nothing_behind(simulation, tmp_path):
     def breaks(_record):
         raise KeyboardInterrupt
