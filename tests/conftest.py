@@ -1,6 +1,7 @@
 """What all tests share: where real recordings are, and a tiny finished run."""
 
 import os
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,6 +21,10 @@ ROOT = Path(__file__).resolve().parents[1]
 # the first call of a kernel compiles it, which no deadline foresees
 settings.register_profile("glassslam", deadline=None)
 settings.load_profile("glassslam")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # a shell lets jobs in the background ignore Ctrl-C, and so would every process that tests begin
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
