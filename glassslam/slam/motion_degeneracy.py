@@ -14,6 +14,7 @@ from glassslam.slam.result import Degeneracy
 _BARE, _LEAST_HOLD = 0.05, 0.05
 _LEAST_TIME, _LONGEST_STEP, _MANY_STEPS = 5.0, 1.0, 3.0
 _MOSTLY, _LEAST_WAY = 0.5, 0.25
+_RESTS = 0.3
 
 
 def motion_degeneracies(trace: Trace) -> Iterator[Degeneracy]:
@@ -37,10 +38,18 @@ def motion_degeneracies(trace: Trace) -> Iterator[Degeneracy]:
         text = f"the odometry stood still for {seconds:.0f} s, and {changed}"
         yield trace.told("odometry stuck", stuck.first, stuck.last, text)
     for missed in trace.motion.missed:
+        if _wheels_rest(trace.motion.odometry[missed.first : missed.last + 1]):
+            continue  # people around a robot that stands; of odometry that is stuck is told above
         seconds = abs(float(trace.stamps[missed.last] - trace.stamps[missed.first]))
         changed = f"{missed.share:.0%} of what the lidar saw changed"
         text = f"the robot rests in the map for {seconds:.0f} s, and {changed}"
         yield trace.told("motion missed", missed.first, missed.last, text)
+
+
+def _wheels_rest(odometry: FloatArray) -> bool:
+    """Whether odometry, poses (n, 3), m and rad, tells as well that the robot rests."""
+    known = odometry[np.isfinite(odometry).all(axis=1)]
+    return 2 * len(known) > len(odometry) and bool((np.ptp(known[:, :2], axis=0) < _RESTS).all())
 
 
 def _nothing_tells(trace: Trace, motion: MotionReport) -> Iterator[Degeneracy]:

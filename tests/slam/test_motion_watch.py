@@ -210,3 +210,16 @@ class TestWholeRuns:
         kinds, warnings = told(scans_only(recording(RING, fast, beams=240)))
         assert [kind for kind, _, _ in kinds] == ["motion missed"]
         assert any("the robot rests in the map while the scans change" in text for text in warnings)
+
+    @pytest.mark.parametrize("wheels", [True, False])
+    def test_of_a_crowd_around_a_robot_that_stands_odometry_knows(self, wheels):
+        random = np.random.default_rng(1)
+        still = standing((2.0, 1.0, 0.4), 150)
+        records = recording(ROOM, still, odometry(still) + random.normal(0.0, 0.005, (150, 3)))
+        for k, record in enumerate(records):
+            if isinstance(record, LaserScan):
+                ranges = record.ranges.copy()
+                ranges[: len(ranges) // 4] = random.uniform(0.3, 1.8, len(ranges) // 4)
+                records[k] = replace(record, ranges=ranges)
+        kinds, _ = told(records if wheels else scans_only(records))
+        assert ("motion missed" in [kind for kind, _, _ in kinds]) is not wheels
