@@ -25,6 +25,7 @@ from glassslam.session.database import (
 )
 from glassslam.session.identity import Recorded, checked, identify
 from glassslam.session.journal import SessionJournal
+from glassslam.session.options import options_of, ring_file, stored_ring
 from glassslam.session.schema import transaction
 from glassslam.session.store import (
     forget_finished,
@@ -33,13 +34,11 @@ from glassslam.session.store import (
     read_nodes,
     read_scans,
     save_finished,
-    tupled,
     write_facts,
 )
 from glassslam.slam.closure import Closure
 from glassslam.slam.node import Node
 from glassslam.sources import SourceOptions
-from glassslam.sources.rings import ring_names
 from glassslam.yamltext import parse_yaml
 
 SESSION_FILE: Final = "session.db"
@@ -86,8 +85,8 @@ class Session:
             self.config = Config.from_mapping(parse_yaml(self._facts["config"]), str(path))
             self.recordings = tuple(Recorded(**known) for known in self._facts["recordings"])
             self._sonar = self._facts["sonar"] and Recorded(**self._facts["sonar"])
-            self._ring = _ring_file(self._facts["options"])
-            self.options = _options(self._facts["options"], self._sonar)
+            self._ring = ring_file(self._facts["options"])
+            self.options = options_of(self._facts["options"], self._sonar)
             self.version = str(self._facts["glassslam"])
         except (KeyError, TypeError, ValueError) as error:
             raise damaged(path, f"it does not tell the recording ({error})") from error
@@ -129,7 +128,7 @@ class Session:
             "config": (config or Config()).dump(),
             "recordings": [asdict(identify(recording)) for recording in recordings],
             "sonar": None if options.sonar is None else asdict(identify(options.sonar)),
-            "options": {**asdict(options), "sonar": None, "sonar_ring": _ring(options.sonar_ring)},
+            "options": {**asdict(options), "sonar": None, "sonar_ring": stored_ring(options.sonar_ring)},
         }
         path = Path(path)
         return cls(path, create(path, lambda database: write_facts(database, facts)))
@@ -349,25 +348,3 @@ class Session:
             self.close()
         else:
             self.abandon()
-
-
-def _options(values: dict[str, Any], sonar: Recorded | None) -> SourceOptions:
-    given: dict[str, Any] = {name: tupled(value) for name, value in values.items()}
-    given["sonar"] = None if sonar is None else sonar.found()
-    if (ring := _ring_file(values)) is not None:
-        given["sonar_ring"] = ring.path
-    return SourceOptions(**given)
-
-
-def _ring(value: str | Path | None) -> str | dict[str, str] | None:
-    """Where the sonars sit, by name or as a file: that by its whole path, which leads there from anywhere."""
-    if value is None or str(value) in ring_names() or not Path(value).is_file():
-        return None if value is None else str(value)
-    known = identify(value)
-    return {"path": known.path, "digest": known.digest}
-
-
-def _ring_file(values: dict[str, Any]) -> Recorded | None:
-    """The file that tells where the sonars sit; None where it is a name, or none is given."""
-    ring = values["sonar_ring"]
-    return Recorded(given=ring["path"], **ring) if isinstance(ring, dict) else None

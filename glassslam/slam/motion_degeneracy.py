@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from glassslam.records import FloatArray
 from glassslam.slam.contradiction import contradictions
 from glassslam.slam.degeneracy import Trace, featureless
-from glassslam.slam.motion_watch import MotionReport
+from glassslam.slam.motion_watch import MotionReport, Stuck
 from glassslam.slam.result import Degeneracy
 
 _BARE, _LEAST_HOLD = 0.05, 0.05
@@ -33,17 +33,17 @@ def motion_degeneracies(trace: Trace) -> Iterator[Degeneracy]:
     yield from _nothing_tells(trace, trace.motion)
     yield from contradictions(trace, trace.motion)
     for stuck in trace.motion.stuck:
-        seconds = abs(float(trace.stamps[stuck.last] - trace.stamps[stuck.first]))
-        changed = f"{stuck.share:.0%} of what the lidar saw changed"
-        text = f"the odometry stood still for {seconds:.0f} s, and {changed}"
-        yield trace.told("odometry stuck", stuck.first, stuck.last, text)
+        yield _rest(trace, "odometry stuck", "the odometry stood still", stuck)
     for missed in trace.motion.missed:
-        if _wheels_rest(trace.motion.odometry[missed.first : missed.last + 1]):
-            continue  # people around a robot that stands; of odometry that is stuck is told above
-        seconds = abs(float(trace.stamps[missed.last] - trace.stamps[missed.first]))
-        changed = f"{missed.share:.0%} of what the lidar saw changed"
-        text = f"the robot rests in the map for {seconds:.0f} s, and {changed}"
-        yield trace.told("motion missed", missed.first, missed.last, text)
+        # people around a robot that stands; of odometry that is stuck is told above
+        if not _wheels_rest(trace.motion.odometry[missed.first : missed.last + 1]):
+            yield _rest(trace, "motion missed", "the robot rests in the map", missed)
+
+
+def _rest(trace: Trace, kind: str, what: str, rest: Stuck) -> Degeneracy:
+    seconds = abs(float(trace.stamps[rest.last] - trace.stamps[rest.first]))
+    text = f"{what} for {seconds:.0f} s, and {rest.share:.0%} of what the lidar saw changed"
+    return trace.told(kind, rest.first, rest.last, text)
 
 
 def _wheels_rest(odometry: FloatArray) -> bool:
